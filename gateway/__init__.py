@@ -1,0 +1,1 @@
+"""Bytes in, bytes kept, answers out: the only package with input, output, threads and clocks."""

@@ -1,0 +1,1 @@
+"""A world and its instruments to byte-exact bus traffic."""
