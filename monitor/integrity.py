@@ -1,0 +1,214 @@
+"""One scan, the aircraft's state and the terrain to a verdict: does the stored terrain agree with the radar?"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from decoders.formats import MODES_708
+from monitor import aircraft as state
+from monitor.aircraft import Aircraft, status_name
+from monitor.calibration import UNCALIBRATED, Calibration
+from monitor.disparity import (
+    minimum_detectable_bias,
+    normalised,
+    robust_statistic,
+    robust_threshold,
+    statistic,
+    threshold,
+)
+from monitor.geodesy import LONGEST_RANGE_NM, NM_M, body_to_enu, displace
+from monitor.prediction import Beam, Pointing, predict
+from monitor.scans import Scan
+from monitor.settings import MonitorSettings
+from monitor.shade import pair, radar_states, shadows, unmatched_share
+from monitor.terrain import Terrain
+
+OK, ALERT, UNAVAILABLE = "ok", "alert", "unavailable"
+NEEDED = (state.LATITUDE, state.LONGITUDE, state.HEIGHT, state.PITCH, state.ROLL, state.HEADING)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The answer for one scan, and the numbers behind it. Disparities are in range bins."""
+
+    scan: int
+    verdict: str
+    reasons: tuple[str, ...]
+    n_pairs: int
+    t_bins2: float | None
+    t_normalised: float | None
+    q: float | None
+    threshold: float | None
+    mean_bins: float | None
+    mean_stderr_bins: float | None
+    unmatched_radar: float | None
+    unmatched_dem: float | None
+    mdb_bins: float | None
+    calibration: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Both threads of one scan on the radials in use: what a picture or a calibration needs."""
+
+    scan_angle_deg: NDArray[np.float64]
+    radar_states: NDArray[np.int8]
+    dem_states: NDArray[np.int8]
+    disparities: NDArray[np.float64]
+    unmatched_radar: float | None
+    unmatched_dem: float | None
+
+
+class Monitor:
+    """Holds the terrain, the calibration and the settings, and judges scans."""
+
+    def __init__(
+        self, terrain: Terrain, settings: MonitorSettings | None = None, calibration: Calibration | None = None
+    ) -> None:
+        self.terrain = terrain
+        self.settings = settings or MonitorSettings()
+        self.calibration = calibration or UNCALIBRATED
+
+    def judge(self, scan: Scan, aircraft: Aircraft) -> tuple[Verdict, Comparison | None]:
+        """The verdict on a scan; the comparison is None where the radar or the state did not allow one."""
+        refusal = self._refusal(scan)
+        if refusal:
+            return self.unavailable(scan.number, [refusal]), None
+        chosen = thin(scan.scan_angle_deg, self.settings.radial_spacing_deg)
+        chosen = chosen[~scan.beyond_limits[chosen]]
+        pointing, usable, reasons = self._point(scan, aircraft, chosen)
+        if not usable.any():
+            return self.unavailable(scan.number, reasons), None
+        comparison, lost = self._compare(scan, chosen[usable], pointing)
+        if lost:
+            reasons.append(f"{lost} radials leave the terrain or cross voids")
+        return self._decide(scan, comparison, reasons), comparison
+
+    def _refusal(self, scan: Scan) -> str | None:
+        if scan.mode != MODES_708["map"]:
+            return f"radar is in mode {scan.mode}, not map: ground returns are filtered out"
+        if scan.range_nm > LONGEST_RANGE_NM:
+            return f"range setting {scan.range_nm:g} NM is beyond {LONGEST_RANGE_NM:g} NM, where shadows mean nothing"
+        return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm)
+
+    def _point(
+        self, scan: Scan, aircraft: Aircraft, chosen: NDArray[np.intp]
+    ) -> tuple[Pointing, NDArray[np.bool_], list[str]]:
+        """Where the antenna was and looked, on the radials whose state is known, and why others are not."""
+        times = scan.time_ns[chosen]
+        found = [aircraft.tracks[quantity.name].at(times) for quantity in NEEDED]
+        status = np.stack([values.status for values in found])
+        usable = (status == 0).all(axis=0)
+        reasons = [
+            f"{quantity.name}: {status_name(int(row[row > 0][0]))} on {np.count_nonzero(row)} of {len(times)} radials"
+            for quantity, row in zip(NEEDED, status, strict=True)
+            if row.any()
+        ]
+        if scan.beyond_limits.any():
+            reasons.append(f"{np.count_nonzero(scan.beyond_limits)} radials have attitude or tilt beyond limits")
+        lat, lon, height, pitch, roll, heading = (values.value[usable] for values in found)
+        arm = self.settings.lever_arm
+        ones = np.ones(len(lat))
+        east, north, up = body_to_enu(arm.forward_m * ones, arm.right_m * ones, arm.down_m * ones, roll, pitch, heading)
+        lat, lon, height = displace(lat, lon, height, east, north, up)
+        angle, tilt = np.radians(scan.scan_angle_deg[chosen][usable]), math.radians(scan.tilt_deg)
+        if scan.stabilised:
+            azimuth, elevation = np.radians(heading) + angle, np.full(len(lat), tilt)
+        else:
+            look = (math.cos(tilt) * np.cos(angle), math.cos(tilt) * np.sin(angle), -math.sin(tilt) * ones)
+            east, north, up = body_to_enu(*look, roll, pitch, heading)
+            azimuth, elevation = np.arctan2(east, north), np.arcsin(np.clip(up, -1, 1))
+        return Pointing(lat, lon, height, azimuth, elevation), usable, reasons
+
+    def _compare(self, scan: Scan, radials: NDArray[np.intp], pointing: Pointing) -> tuple[Comparison, int]:
+        s = self.settings
+        bins = scan.bins.shape[1]
+        limit = bins if s.range_limit_nm is None else min(bins, int(bins * s.range_limit_nm / scan.range_nm))
+        beam = Beam(s.beam_width_deg, s.azimuth_fan, s.refraction_k, s.range_reference)
+        dem, void = predict(self.terrain.grid, pointing, limit, scan.range_nm * NM_M / bins, beam)
+        dem, radials = dem[~void], radials[~void]
+        radar = radar_states(scan.bins[radials, :limit])
+        seen = shadows(radar, "radar", s.minimum_size, s.maximum_size)
+        predicted = shadows(dem, "dem", s.minimum_size, s.maximum_size)
+        pairs = pair(seen, predicted)
+        pairs = pairs[~seen["range_limited"][pairs["radar"]]]
+        d = seen["centre"][pairs["radar"]] - predicted["centre"][pairs["dem"]]
+        return Comparison(
+            scan.scan_angle_deg[radials],
+            radar,
+            dem,
+            d,
+            _share(*unmatched_share(seen, predicted, dem)),
+            _share(*unmatched_share(predicted, seen, radar)),
+        ), int(np.count_nonzero(void))
+
+    def _decide(self, scan: Scan, comparison: Comparison, reasons: list[str]) -> Verdict:
+        s, c, d = self.settings, self.calibration, comparison.disparities
+        n = len(d)
+        if n < s.pairs_needed:
+            few = f"{n} pairs of shadows, {s.pairs_needed} needed"
+            return self.unavailable(scan.number, [few, *reasons], comparison)
+        q = robust_statistic(d, c.median_bins, c.clip_bins, c.sigma_bins)
+        t_normalised = normalised(d, c.rms_bins)
+        if s.method == "robust":
+            value, limit, sigma = q, robust_threshold(n, s.p_fa, c.variance_factor), c.sigma_bins
+        else:
+            value, limit, sigma = t_normalised, threshold(n, s.p_fa), c.rms_bins
+        if value > limit:
+            reasons.insert(0, f"{'Q' if s.method == 'robust' else 'N T / sigma^2'} {value:.1f} exceeds {limit:.1f}")
+        return Verdict(
+            scan=scan.number,
+            verdict=ALERT if value > limit else OK,
+            reasons=tuple(reasons + self._caveats()),
+            n_pairs=n,
+            t_bins2=statistic(d),
+            t_normalised=t_normalised,
+            q=q,
+            threshold=limit,
+            mean_bins=float(np.mean(d)),
+            mean_stderr_bins=float(np.std(d, ddof=1) / math.sqrt(n)),
+            unmatched_radar=comparison.unmatched_radar,
+            unmatched_dem=comparison.unmatched_dem,
+            mdb_bins=minimum_detectable_bias(n, sigma, s.p_fa, s.p_md),
+            calibration=c.name,
+        )
+
+    def unavailable(self, scan: int, reasons: list[str], comparison: Comparison | None = None) -> Verdict:
+        """The verdict that nothing can be said about a scan, with whatever was measured all the same."""
+        d = comparison.disparities if comparison else np.empty(0)
+        return Verdict(
+            scan=scan,
+            verdict=UNAVAILABLE,
+            reasons=tuple(reasons + self._caveats()),
+            n_pairs=len(d),
+            t_bins2=statistic(d) if len(d) else None,
+            t_normalised=None,
+            q=None,
+            threshold=None,
+            mean_bins=float(np.mean(d)) if len(d) else None,
+            mean_stderr_bins=None,
+            unmatched_radar=comparison.unmatched_radar if comparison else None,
+            unmatched_dem=comparison.unmatched_dem if comparison else None,
+            mdb_bins=None,
+            calibration=self.calibration.name,
+        )
+
+    def _caveats(self) -> list[str]:
+        return ["no calibration loaded: stated defaults in use"] if self.calibration is UNCALIBRATED else []
+
+
+def thin(scan_angle_deg: NDArray[np.float64], spacing_deg: float) -> NDArray[np.intp]:
+    """Indices of one radial for each multiple of `spacing_deg`, the nearest to it, in order of arrival.
+
+    Neighbours within a beam see the same shadow: counted as independent they turn a P_FA of 1e-3 into 0.04.
+    """
+    cell = np.round(scan_angle_deg / spacing_deg)
+    order = np.lexsort((np.abs(scan_angle_deg - cell * spacing_deg), cell))
+    first = np.r_[True, np.diff(cell[order]) > 0] if len(order) else np.zeros(0, bool)
+    return np.sort(order[first])
+
+
+def _share(unmatched: int, eligible: int) -> float | None:
+    return unmatched / eligible if eligible else None

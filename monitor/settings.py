@@ -1,0 +1,47 @@
+"""What the monitor can be told: every option with its unit, its bounds and a sentence."""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class LeverArm(BaseModel):
+    """From the GNSS antenna to the radar antenna in the aircraft's body, metres."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    forward_m: float = Field(0.0, ge=-100, le=100)
+    right_m: float = Field(0.0, ge=-100, le=100)
+    down_m: float = Field(0.0, ge=-100, le=100)
+
+
+class MonitorSettings(BaseModel):
+    """The integrity monitor's options; the defaults are the ones the evidence is given for."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    method: Literal["robust", "paper"] = Field("robust", description="which test decides: clipped Q, or T as published")
+    p_fa: float = Field(1e-4, gt=0, lt=0.5, description="probability of a false alert in one scan")
+    p_md: float = Field(
+        1e-3, gt=0, lt=1, description="probability of a missed detection that the stated MDB stands for"
+    )
+    minimum_pairs: int | None = Field(
+        None, ge=2, description="pairs below which T is unavailable; 16 if not set, 20 for p_fa of 1e-4 and below"
+    )
+    beam_width_deg: float = Field(3.5, gt=0.1, le=30, description="one-way 3 dB width of the antenna beam")
+    azimuth_fan: int = Field(7, ge=1, le=99, description="sub-azimuths over the beam width; 1 is the paper's form")
+    refraction_k: float = Field(
+        4 / 3, gt=0, description="effective Earth radius factor; inf for the paper's flat Earth"
+    )
+    range_reference: Literal["centre", "far_edge"] = Field("centre", description="where in its bin a range is taken")
+    radial_spacing_deg: float = Field(3.0, gt=0, le=30, description="one radial in every so many degrees enters T")
+    minimum_size: int = Field(3, ge=1, description="smallest shadow used, range bins")
+    maximum_size: int | None = Field(None, ge=1, description="largest shadow used, range bins")
+    range_limit_nm: float | None = Field(
+        None, gt=0, description="ignore everything beyond; the range setting if not set"
+    )
+    lever_arm: LeverArm = LeverArm()
+
+    @property
+    def pairs_needed(self) -> int:
+        """The least number of pairs for a verdict: with fewer, the clipped Q could not reach its threshold."""
+        return self.minimum_pairs or (20 if self.p_fa <= 1e-4 else 16)

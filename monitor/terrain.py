@@ -1,0 +1,140 @@
+"""The terrain store: GeoTIFF, SRTM HGT and DTED files as one grid of posts, sampled bilinearly.
+
+Posts are indexed by pixel *centres*: GDAL widens the bounds of HGT and DTED cells by half a post, so the centres are
+the posts of the standard. Voids become NaN before anything interpolates, so a void post spoils the four cells around
+it and nothing else.
+"""
+
+import math
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import rasterio
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+from rasterio.enums import Resampling
+from rasterio.errors import RasterioError
+from rasterio.vrt import WarpedVRT
+
+WGS84 = "EPSG:4326"
+ALIGNMENT_POSTS = 0.05  # files whose posts miss a common grid by more are refused: resampling is not ours to hide
+
+
+class TerrainError(ValueError):
+    """A terrain file that is missing, unreadable, without a place on Earth, or not on the grid of its neighbours."""
+
+
+class Grid(NamedTuple):
+    """Posts in degrees north and east; `height_m` is float32 (rows southward, columns eastward), NaN where void."""
+
+    height_m: NDArray[np.float32]
+    north_deg: float
+    west_deg: float
+    row_deg: float
+    column_deg: float
+
+
+class Terrain:
+    """Stored terrain heights. Made by `open_terrain`."""
+
+    def __init__(self, grid: Grid, paths: Sequence[Path], checksum: str) -> None:
+        self.grid = grid
+        self.paths = tuple(paths)
+        self.checksum = checksum
+
+    def elevation(self, latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> NDArray[np.float64]:
+        """Heights in metres at WGS 84 degrees, any shape; NaN where a needed post is void or outside the files."""
+        lat, lon = np.broadcast_arrays(np.asarray(latitude_deg, float), np.asarray(longitude_deg, float))
+        return _sample_all(self.grid, lat.ravel(), lon.ravel()).reshape(lat.shape)
+
+
+def open_terrain(path_or_paths: str | Path | Sequence[str | Path]) -> Terrain:
+    """Open one terrain file or mosaic several that share a post spacing.
+
+    Raises TerrainError, naming the file and the mend, for a file that is missing, cannot be read, has no coordinate
+    reference system, or does not lie on the same grid as the first. Of overlapping files the first with a height wins.
+    """
+    given = [path_or_paths] if isinstance(path_or_paths, str | Path) else list(path_or_paths)
+    if not given:
+        raise TerrainError("no terrain file given: name at least one GeoTIFF, HGT or DTED file")
+    paths = [Path(p) for p in given]
+    tiles = [_read(path) for path in paths]
+    checksum = 0
+    for path in paths:
+        checksum = zlib.crc32(path.read_bytes(), checksum)
+    return Terrain(_mosaic(tiles, paths), paths, f"{checksum:08x}")
+
+
+def _read(path: Path) -> Grid:
+    if not path.is_file():
+        raise TerrainError(f"terrain file {path} does not exist: check the path in the configuration or --dem")
+    try:
+        with rasterio.open(path) as source:
+            if source.crs is None:
+                raise TerrainError(f"{path} has no coordinate reference system: assign one with gdal_edit.py -a_srs")
+            if source.crs.is_geographic:
+                return _grid(source)
+            with WarpedVRT(source, crs=WGS84, resampling=Resampling.bilinear) as geographic:
+                return _grid(geographic)
+    except RasterioError as error:
+        raise TerrainError(f"{path} cannot be read as terrain (GeoTIFF, HGT or DTED): {error}") from error
+
+
+def _grid(source: rasterio.DatasetReader) -> Grid:
+    height_m = source.read(1, masked=True).astype(np.float32).filled(np.nan)
+    t = source.transform
+    if t.b or t.d or t.a <= 0 or t.e >= 0:
+        raise TerrainError(f"{source.name} is not a north-up raster: warp it with gdalwarp")
+    return Grid(height_m, t.f + t.e / 2, t.c + t.a / 2, -t.e, t.a)
+
+
+def _mosaic(tiles: list[Grid], paths: list[Path]) -> Grid:
+    first = tiles[0]
+    if len(tiles) == 1:
+        return first
+    north = max(tile.north_deg for tile in tiles)
+    west = min(tile.west_deg for tile in tiles)
+    corners = [_corner(tile, first, north, west, path) for tile, path in zip(tiles, paths, strict=True)]
+    rows = max(row + tile.height_m.shape[0] for (row, _), tile in zip(corners, tiles, strict=True))
+    columns = max(column + tile.height_m.shape[1] for (_, column), tile in zip(corners, tiles, strict=True))
+    height_m = np.full((rows, columns), np.nan, np.float32)
+    for (row, column), tile in zip(corners, tiles, strict=True):
+        place = height_m[row : row + tile.height_m.shape[0], column : column + tile.height_m.shape[1]]
+        np.copyto(place, tile.height_m, where=np.isnan(place))
+    return Grid(height_m, north, west, first.row_deg, first.column_deg)
+
+
+def _corner(tile: Grid, first: Grid, north: float, west: float, path: Path) -> tuple[int, int]:
+    row, column = (north - tile.north_deg) / first.row_deg, (tile.west_deg - west) / first.column_deg
+    same_spacing = math.isclose(tile.row_deg, first.row_deg, rel_tol=1e-6) and math.isclose(
+        tile.column_deg, first.column_deg, rel_tol=1e-6
+    )
+    if not same_spacing or max(abs(row - round(row)), abs(column - round(column))) > ALIGNMENT_POSTS:
+        raise TerrainError(f"{path} is not on the grid of the first terrain file: warp it to that grid with gdalwarp")
+    return round(row), round(column)
+
+
+@njit(cache=True, inline="always")
+def sample(grid: Grid, latitude_deg: float, longitude_deg: float) -> float:
+    """Bilinear height in metres; NaN where one of the four posts is void or the place is outside."""
+    row = (grid.north_deg - latitude_deg) / grid.row_deg
+    column = (longitude_deg - grid.west_deg) / grid.column_deg
+    rows, columns = grid.height_m.shape
+    if not (0.0 <= row <= rows - 1 and 0.0 <= column <= columns - 1):
+        return math.nan
+    i, j = min(int(row), rows - 2), min(int(column), columns - 2)
+    u, v = row - i, column - j
+    upper: float = grid.height_m[i, j] * (1 - v) + grid.height_m[i, j + 1] * v
+    lower: float = grid.height_m[i + 1, j] * (1 - v) + grid.height_m[i + 1, j + 1] * v
+    return upper * (1 - u) + lower * u
+
+
+@njit(cache=True)
+def _sample_all(grid: Grid, lat: NDArray[np.float64], lon: NDArray[np.float64]) -> NDArray[np.float64]:
+    out = np.empty(lat.size)
+    for k in range(lat.size):
+        out[k] = sample(grid, lat[k], lon[k])
+    return out

@@ -1,0 +1,87 @@
+"""The history of one measured quantity, and its value at any time between and shortly after its samples.
+
+A sample that the bus marked as anything but normal is a hole: nothing is interpolated across it and nothing
+extrapolated from it. The same goes for a silence longer than the quantity allows.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+NORMAL, STALE, MISSING = 0, 254, 255  # bus statuses of ARINC 429 words lie between
+NS = 1e-9
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity: its unit is in its name; `longest_gap_s` bounds interpolation and extrapolation; angles wrap."""
+
+    name: str
+    longest_gap_s: float
+    angle: bool = False
+
+
+class Values(NamedTuple):
+    """Values f8 (n,), 0 where `status` u1 (n,) is not NORMAL: a bus status, STALE or MISSING."""
+
+    value: NDArray[np.float64]
+    status: NDArray[np.uint8]
+
+
+def wrap(angle_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same angles in [-180, 180)."""
+    return (angle_deg + 180) % 360 - 180
+
+
+class Track:
+    """The last `capacity` samples of one quantity, in order of time."""
+
+    def __init__(self, quantity: Quantity, capacity: int = 4096) -> None:
+        self.quantity = quantity
+        self._capacity = capacity
+        self._time = np.empty(2 * capacity, np.int64)
+        self._value = np.empty(2 * capacity)
+        self._status = np.empty(2 * capacity, np.uint8)
+        self._end = 0
+
+    def append(self, time_ns: NDArray[np.int64], value: NDArray[np.float64], status: NDArray[np.uint8]) -> None:
+        """Add samples (n,) in order of time; a clock that stepped back forgets what it had measured before."""
+        if self._end and time_ns[0] < self._time[self._end - 1]:
+            self._end = 0
+        newest = slice(-self._capacity, None)
+        time_ns, value, status = time_ns[newest], value[newest], status[newest]
+        if self._end + len(time_ns) > 2 * self._capacity:
+            for store in (self._time, self._value, self._status):
+                store[: self._capacity] = store[self._end - self._capacity : self._end]
+            self._end = self._capacity
+        place = slice(self._end, self._end + len(time_ns))
+        self._time[place], self._value[place], self._status[place] = time_ns, value, status
+        self._end = place.stop
+
+    def at(self, time_ns: NDArray[np.int64]) -> Values:
+        """The quantity at times i8 (n,): linear between two normal samples, and shortly beyond the last two."""
+        if self._end < 2:
+            return Values(np.zeros(len(time_ns)), np.full(len(time_ns), MISSING, np.uint8))
+        times, values, statuses = self._time[: self._end], self._value[: self._end], self._status[: self._end]
+        after = np.clip(np.searchsorted(times, time_ns), 1, self._end - 1)
+        before = after - 1
+        span = times[after] - times[before]
+        reach = np.maximum(span, np.maximum(time_ns - times[after], times[before] - time_ns))
+        status = np.maximum(statuses[before], statuses[after])
+        status[(reach > self.quantity.longest_gap_s / NS) & (status == NORMAL)] = STALE
+        step = values[after] - values[before]
+        if self.quantity.angle:
+            step = wrap(step)
+        value = values[before] + step * ((time_ns - times[before]) / np.maximum(span, 1))
+        if self.quantity.angle:
+            value = wrap(value)
+        return Values(np.where(status == NORMAL, value, 0.0), status)
+
+    @property
+    def newest(self) -> tuple[int, float, int] | None:
+        """Time in ns, value and status of the last sample, or None before the first."""
+        if not self._end:
+            return None
+        return int(self._time[self._end - 1]), float(self._value[self._end - 1]), int(self._status[self._end - 1])

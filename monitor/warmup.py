@@ -1,0 +1,41 @@
+"""Load the compiled kernels before the first scan needs them."""
+
+import numpy as np
+
+from monitor.aircraft import Aircraft
+from monitor.integrity import NEEDED, Monitor
+from monitor.scans import Scan
+
+SECOND_NS = 1_000_000_000
+
+
+def warm_up(monitor: Monitor) -> None:
+    """Judge a made-up scan over the middle of the terrain and forget the answer."""
+    grid = monitor.terrain.grid
+    aircraft = Aircraft()
+    middle = {
+        "latitude_deg": grid.north_deg - grid.height_m.shape[0] / 2 * grid.row_deg,
+        "longitude_deg": grid.west_deg + grid.height_m.shape[1] / 2 * grid.column_deg,
+        "height_m": float(np.nanmax(grid.height_m)),
+    }
+    times = np.array([0, SECOND_NS // 10])
+    for quantity in NEEDED:
+        values = np.full(2, middle.get(quantity.name, 0.0))
+        aircraft.tracks[quantity.name].append(times, values, np.zeros(2, np.uint8))
+    angles = np.arange(-9.0, 10.0, 3.0)
+    bins = np.tile(np.arange(512, dtype=np.uint8) // 8 % 2, (len(angles), 1))
+    scan = Scan(
+        number=0,
+        time_ns=np.full(len(angles), SECOND_NS // 20),
+        scan_angle_deg=angles,
+        beyond_limits=np.zeros(len(angles), bool),
+        bins=bins,
+        tilt_deg=-2.0,
+        range_nm=10.0,
+        mode=2,
+        stabilised=True,
+        missing=0,
+        repeated=0,
+    )
+    settings = monitor.settings.model_copy(update={"minimum_pairs": 2})
+    Monitor(monitor.terrain, settings).judge(scan, aircraft)
