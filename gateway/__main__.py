@@ -1,0 +1,5 @@
+"""`python -m gateway` is `shadebus`."""
+
+from gateway.cli import main
+
+main()

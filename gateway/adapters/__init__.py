@@ -1,0 +1,35 @@
+"""Adapters bring bytes in. Each kind is one module, imported when a source names it."""
+
+from importlib import import_module
+from typing import Protocol
+
+from gateway.config import AdapterConfig
+from gateway.errors import GatewayError
+
+KINDS = {"serial": "gateway.adapters.serial"}
+
+
+class Port(Protocol):
+    """An opened source of bytes."""
+
+    def read(self) -> bytes:
+        """What has come, or nothing after a short wait. Any exception means that the port is lost."""
+
+    def close(self) -> None:
+        """Let the device go; never raises for a device that is gone already."""
+
+
+class Adapter(Protocol):
+    """A source that can be opened again and again. Listen-only: nothing here can write."""
+
+    def open(self) -> Port:
+        """Open the device, or raise OSError or another error that says why not."""
+
+
+def make_adapter(config: AdapterConfig) -> Adapter:
+    """The adapter that a source such as `serial:/dev/ttyUSB0` names."""
+    kind, _, address = config.source.partition(":")
+    if kind not in KINDS:
+        raise GatewayError(f"source {config.source!r}: unknown kind {kind!r}, use one of {', '.join(KINDS)}")
+    adapter: Adapter = import_module(KINDS[kind]).make(address, config)
+    return adapter

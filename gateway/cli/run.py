@@ -1,0 +1,56 @@
+"""`shadebus run`: the service."""
+
+import signal
+import sys
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def run(
+    config: Annotated[Path | None, typer.Option("-c", "--config", help="rack file (TOML)")] = None,
+    source: Annotated[list[str] | None, typer.Option(help="KIND:ADDRESS without a rack file; repeatable")] = None,
+    dem: Annotated[list[Path] | None, typer.Option(help="terrain file; repeatable")] = None,
+    record: Annotated[Path | None, typer.Option(help="directory for the recording")] = None,
+    calibration: Annotated[Path | None, typer.Option(help="calibration file of the radar")] = None,
+    json: Annotated[bool, typer.Option("--json", help="events as JSON lines")] = False,
+    seconds: Annotated[float | None, typer.Option("--for", help="stop after so many seconds")] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="start although a device is not there yet")] = False,
+) -> None:
+    """Listen to the buses, record every byte, and judge the terrain live."""
+    from gateway.config import RackConfig, check_config, load_config
+    from gateway.console import print_json, print_line
+    from gateway.errors import GatewayError
+    from gateway.metadata import build_monitor
+    from gateway.service import Service
+
+    if bool(config) == bool(source):
+        raise GatewayError("name either a rack file with -c or at least one --source, such as serial:/dev/ttyUSB0")
+    rack: RackConfig
+    if config:
+        rack = load_config(config)
+    else:
+        adapters = [{"name": f"bridge{k}", "source": text} for k, text in enumerate(source or [])]
+        rack = check_config({"adapters": adapters}, "--source")
+    changes: dict[str, object] = {}
+    if dem:
+        changes["terrain"] = dem
+    if record:
+        changes["recording"] = {**(rack.recording.model_dump() if rack.recording else {}), "directory": record}
+    if calibration:
+        changes["calibration"] = calibration
+    if wait:
+        changes["wait_for_devices"] = True
+    rack = check_config({**rack.model_dump(), **changes}, "options")
+
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    service = Service(rack, build_monitor(rack), print_json if json else print_line)
+    if service.recording_path:
+        print(f"recording to {service.recording_path}", file=sys.stderr)
+    service.run_until(stop, seconds)
+    if service.failures:
+        raise GatewayError("; ".join(service.failures))

@@ -1,0 +1,44 @@
+"""What a person at a terminal reads: one line an event."""
+
+import sys
+from datetime import UTC, datetime
+
+from gateway.events import Event, IntegrityEvent, ScanEvent, StatusEvent, SummaryEvent
+
+
+def print_json(event: Event) -> None:
+    """One JSON line on stdout, at once."""
+    sys.stdout.write(event.to_json() + "\n")
+    sys.stdout.flush()
+
+
+def print_line(event: Event) -> None:
+    """One line on stdout for what a person wants to know; the aircraft's state is left to --json."""
+    text = describe(event)
+    if text:
+        sys.stdout.write(f"{clock(event.time_ns)}  {text}\n")
+        sys.stdout.flush()
+
+
+def describe(event: Event) -> str:
+    """A person's line for an event, or nothing."""
+    if isinstance(event, StatusEvent):
+        return f"{event.adapter}: {event.state}" + (f" ({event.reason})" if event.reason else "")
+    if isinstance(event, ScanEvent):
+        low, high = event.sector_deg
+        gaps = f", {event.gaps} missing" if event.gaps else ""
+        return f"scan {event.scan}: {event.radials} radials{gaps}, {low:+.0f} to {high:+.0f} deg, {event.range_nm:g} NM"
+    if isinstance(event, IntegrityEvent):
+        reasons = "; ".join(event.reasons)
+        if event.q is None or event.threshold is None or event.t_bins2 is None:
+            return f"scan {event.scan}: {event.verdict.upper()}  {reasons}"
+        figures = f"N {event.n_pairs}  T {event.t_bins2:.1f} bins2  Q {event.q:.1f} against {event.threshold:.1f}"
+        return f"scan {event.scan}: {event.verdict.upper()}  {figures}  {reasons}"
+    if isinstance(event, SummaryEvent):
+        return "summary: " + ", ".join(f"{name} {count}" for name, count in event.counters.items() if count)
+    return ""
+
+
+def clock(time_ns: int) -> str:
+    """UTC to the millisecond."""
+    return datetime.fromtimestamp(time_ns / 1e9, UTC).strftime("%H:%M:%S.%f")[:-3]

@@ -1,0 +1,69 @@
+"""The core thread's work: records to events, whatever happens.
+
+A failure of the pipeline is reported (and so recorded) and the pipeline is built anew, so one bad record costs what it
+interrupts and no more; the run ends with a non-zero exit all the same. A core that falls behind skips records, says how
+many, and its next verdict says so; the recording stays whole.
+"""
+
+from collections.abc import Callable
+
+from gateway.events import Event
+from gateway.pipeline import Pipeline
+from gateway.queues import ByteQueue
+from gateway.records import Raw, Record
+
+LIMIT_BYTES = 64 << 20
+
+Emit = Callable[[Event], None]
+
+
+class Core:
+    """Runs records through a pipeline that is rebuilt when it fails."""
+
+    def __init__(self, build: Callable[[], Pipeline], emit: Emit, report: Callable[[str], None]) -> None:
+        self.failures = 0
+        self._build = build
+        self._emit = emit
+        self._report = report
+        self._pipeline = build()
+
+    def process(self, record: Record) -> None:
+        """Emit the events of one record."""
+        try:
+            for event in self._pipeline.feed(record):
+                self._emit(event)
+        except Exception as error:  # noqa: BLE001 # a defect in decoding must not end the flight's monitoring
+            self.failures += 1
+            self._report(f"record {record.sequence}: {type(error).__name__}: {error}")
+            self._pipeline = self._build()
+
+    def finish(self) -> None:
+        """Emit what is left, and the summary."""
+        for event in self._pipeline.finish():
+            self._emit(event)
+
+
+class CoreQueue:
+    """Between the journal and the core: never makes the journal wait."""
+
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self.queue: ByteQueue[Record] = ByteQueue(LIMIT_BYTES)
+        self._report = report
+        self._skipped = 0
+
+    def deliver(self, records: list[Record]) -> None:
+        """Pass records on; those without room are skipped and reported once there is room again."""
+        for record in records:
+            size = len(record.data) if isinstance(record, Raw) else 0
+            if not self.queue.put(record, size):
+                self._skipped += 1
+            elif self._skipped and size:
+                self._report(f"{self._skipped} records skipped")
+                self._skipped = 0
+
+    def run(self, core: Core) -> None:
+        """The work of the core's thread, until the queue is closed and empty."""
+        while (records := self.queue.take()) is not None:
+            for record in records:
+                core.process(record)
+        core.finish()

@@ -1,0 +1,211 @@
+"""The demo: three simulated legs over the White Mountains, each through a pseudo-terminal and the shipped gateway.
+
+The gateway runs as its own process, exactly as on a rack; the demo only feeds the other end of the line, shows what the
+gateway says, and afterwards replays each recording and compares the events byte for byte.
+"""
+
+import json
+import math
+import signal
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+import rasterio
+from pyproj import Geod
+from rasterio.transform import Affine
+from rich.console import Console
+from rich.progress import Progress, TaskID
+from rich.table import Table
+
+from gateway.errors import GatewayError
+from gateway.metadata import recorded_config, recorded_monitor
+from gateway.recording import Recording
+from gateway.replay import replay
+from gateway.report import Picture, write_report
+from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Verdict
+from monitor.scans import Scan
+
+SHIFT_EAST_M = 500.0
+LEG_S = 54.0  # twelve sweeps
+GNSS_FAILS_S = 18.0
+P_FA = 1e-4
+COLOURS = {OK: "green", ALERT: "red", UNAVAILABLE: "yellow"}
+START_S, STOP_S = 60.0, 30.0  # a first start compiles the kernels
+CALIBRATION = Path(str(resources.files("simulators"))) / "data" / "demo_calibration.json"
+
+
+@dataclass
+class Leg:
+    """One leg: its terrain, what fails in it, what the gateway should end up saying, and what it said."""
+
+    name: str
+    title: str
+    terrain: Path
+    expected: str
+    faults: tuple[dict[str, Any], ...] = ()
+    lines: list[str] = field(default_factory=list)
+    listening: Event = field(default_factory=Event)
+    recording: Path = Path()
+    identical: bool = False
+    pictures: list[Picture] = field(default_factory=list)
+
+    @property
+    def verdicts(self) -> list[dict[str, Any]]:
+        """The integrity events, in order."""
+        return [event for event in map(json.loads, self.lines) if event["type"] == "integrity"]
+
+    @property
+    def outcome(self) -> str:
+        """The verdict of the last scan."""
+        return str(self.verdicts[-1]["verdict"]) if self.verdicts else "none"
+
+
+def fly(out: Path, seed: int, speed: float) -> None:
+    """Fly the legs, print the table, write the report. Raises GatewayError if anything is not as it must be."""
+    from simulators.scenario import BUILT_IN_TERRAIN
+
+    console = Console()
+    out.mkdir(parents=True, exist_ok=True)
+    true_terrain = BUILT_IN_TERRAIN["white_mountains"]
+    shifted = shift_east(true_terrain, SHIFT_EAST_M, out / "shifted_500m_east.tif")
+    failing = ({"name": "gnss_no_computed_data", "start_s": GNSS_FAILS_S},)
+    legs = [
+        Leg("true", "true terrain", true_terrain, "ok"),
+        Leg("shifted", f"terrain shifted {SHIFT_EAST_M:.0f} m east", shifted, "alert"),
+        Leg("gnss", f"GNSS failing after {GNSS_FAILS_S:.0f} s", true_terrain, "unavailable", failing),
+    ]
+    console.print(
+        f"Three legs of {LEG_S:.0f} s over the White Mountains at {speed:g} times real bus rates, P_FA {P_FA:g}"
+    )
+    for leg in legs:
+        _live(leg, out, seed, speed, console)
+        _again(leg)
+    _table(legs, console)
+    report = write_report(out / "report", {leg.title: leg.pictures for leg in legs})
+    console.print(f"recordings in {out}, report in {report}")
+    wrong = [f"{leg.title}: {leg.outcome}, not {leg.expected}" for leg in legs if leg.outcome != leg.expected]
+    wrong += [f"{leg.title}: replay differs from live" for leg in legs if not leg.identical]
+    if wrong:
+        raise GatewayError("the demo did not come out as it must: " + "; ".join(wrong))
+    console.print("replayed: the events of all three recordings are identical to the live ones, byte for byte")
+
+
+def shift_east(terrain: Path, east_m: float, target: Path) -> Path:
+    """Write a copy of a terrain file whose content lies `east_m` metres farther east (measured at its middle)."""
+    with rasterio.open(terrain) as source:
+        t = source.transform
+        latitude = t.f + t.e * source.height / 2
+        east_deg = east_m / Geod(ellps="WGS84").inv(0, latitude, 1, latitude)[2]
+        profile = {**source.profile, "driver": "GTiff", "transform": Affine(t.a, 0, t.c + east_deg, 0, t.e, t.f)}
+        with rasterio.open(target, "w", **profile) as copy:
+            copy.write(source.read())
+    return target
+
+
+def _live(leg: Leg, out: Path, seed: int, speed: float, console: Console) -> None:
+    from simulators.outlets import PtyOutlet
+    from simulators.player import play
+    from simulators.scenario import Fault, white_mountains
+    from simulators.traffic import traffic
+
+    scenario = white_mountains(LEG_S, seed).model_copy(update={"faults": tuple(Fault(**f) for f in leg.faults)})
+    console.rule(leg.title)
+    with PtyOutlet() as line:
+        config = out / f"{leg.name}.toml"
+        config.write_text(_rack(line.path, leg.terrain, out / leg.name))
+        command = [sys.executable, "-m", "gateway", "run", "-c", str(config), "--json"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as gateway, Progress(console=console) as bar:  # noqa: S603 # our own command
+            reader = Thread(target=_listen, args=(leg, gateway, console))
+            reader.start()
+            task = bar.add_task(leg.title, total=math.ceil(LEG_S))
+            if not leg.listening.wait(START_S):
+                gateway.kill()
+                raise GatewayError(f"leg {leg.title}: the gateway did not open its line within {START_S:.0f} s")
+            play(_shown(traffic(scenario), bar, task), line, speed)
+            line.close()
+            gateway.send_signal(signal.SIGTERM)
+            code = gateway.wait(STOP_S)
+            reader.join()
+    if code:
+        raise GatewayError(f"leg {leg.title}: the gateway ended with exit code {code}")
+    leg.recording = max((out / leg.name).glob("*.mcap"))
+
+
+def _rack(device: str, terrain: Path, directory: Path) -> str:
+    return "\n".join(
+        (
+            f"terrain = [{json.dumps(str(terrain.absolute()))}]",
+            f"calibration = {json.dumps(str(CALIBRATION))}",
+            "[[adapters]]",
+            'name = "bridge"',
+            f'source = "serial:{device}"',
+            "[recording]",
+            f"directory = {json.dumps(str(directory.absolute()))}",
+            "[monitor]",
+            f"p_fa = {P_FA:g}",
+            "",
+        )
+    )
+
+
+def _listen(leg: Leg, gateway: "subprocess.Popen[str]", console: Console) -> None:
+    """Keep every event line, and show verdicts as they come."""
+    for line in gateway.stdout or ():
+        leg.lines.append(line)
+        event = json.loads(line)
+        if event["type"] == "status" and event["state"] == "UP":
+            leg.listening.set()
+        elif event["type"] == "integrity":
+            figures = f"N {event['n_pairs']:3d}"
+            if event["q"] is not None:
+                figures += f"  Q {event['q']:6.1f} against {event['threshold']:.1f}"
+            why = f"  {event['reasons'][0]}" if event["verdict"] == UNAVAILABLE else ""
+            console.print(
+                f"scan {event['scan']:2d}  [{COLOURS[event['verdict']]}]{event['verdict']}[/]  {figures}{why}"
+            )
+
+
+def _shown(packets: Iterator[tuple[int, bytes]], bar: Progress, task: TaskID) -> Iterator[tuple[int, bytes]]:
+    """The same packets, and the bar moved to their time."""
+    for time_ns, data in packets:
+        bar.update(task, completed=time_ns / 1e9)
+        yield time_ns, data
+
+
+def _again(leg: Leg) -> None:
+    """Replay the leg's recording, compare the events with the live ones, and keep what the pictures need."""
+    recording = Recording(leg.recording)
+    config = recorded_config(recording.metadata)
+    monitor = recorded_monitor(recording.metadata, config)
+    replayed: list[str] = []
+    failures: list[str] = []
+
+    def watch(scan: Scan, verdict: Verdict, comparison: Comparison | None) -> None:
+        leg.pictures.append(Picture(scan, verdict, comparison))
+
+    replay(recording, config, monitor, lambda e: replayed.append(e.to_json() + "\n"), failures.append, watcher=watch)
+    leg.identical = replayed == leg.lines and not failures
+
+
+def _table(legs: list[Leg], console: Console) -> None:
+    table = Table("leg", "scans", "ok", "alert", "unavailable", "pairs", "last verdict", "as it must be", "replay")
+    for leg in legs:
+        count = Counter(event["verdict"] for event in leg.verdicts)
+        pairs = sorted(event["n_pairs"] for event in leg.verdicts) or [0]
+        table.add_row(
+            leg.title,
+            str(len(leg.verdicts)),
+            *(str(count[verdict]) for verdict in (OK, ALERT, UNAVAILABLE)),
+            f"{pairs[0]} to {pairs[-1]}",
+            f"[{COLOURS.get(leg.outcome, 'white')}]{leg.outcome}[/]",
+            "yes" if leg.outcome == leg.expected else "NO",
+            "identical" if leg.identical else "DIFFERS",
+        )
+    console.print(table)

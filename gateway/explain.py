@@ -1,0 +1,89 @@
+"""One bus word as rows of a table: field, bits, code, meaning."""
+
+import numpy as np
+
+from decoders import arinc429, arinc708
+from decoders import formats as f
+from decoders.definitions import DefinitionError, load_definitions
+from gateway.errors import GatewayError
+
+Row = tuple[str, str, str, str]
+
+
+def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]:
+    """Rows for one ARINC 429 word in hexadecimal."""
+    word = int.from_bytes(_bytes(text.removeprefix("0x").zfill(8), (4,)), "big")
+    if orientation not in f.ORIENTATIONS:
+        raise GatewayError(f"orientation {orientation!r}: use one of {', '.join(f.ORIENTATIONS)}")
+    try:
+        definitions = load_definitions(definitions_name)
+    except (DefinitionError, ValueError, OSError) as error:
+        raise GatewayError(str(error)) from error
+    block = np.array([word], np.uint32)
+    parts = arinc429.unpack(block, orientation)
+    values = arinc429.decode(block, definitions, orientation)
+    label, ssm = int(parts.label[0]), int(parts.ssm[0])
+    definition = definitions.labels.get(label)
+    status = arinc429.Status(int(values.status[0]))
+    name = definition.name if definition else f"not in {definitions.name}"
+    meaning = f.SSM_TABLES[definition.ssm][ssm] if definition else "depends on the label"
+    rows = [
+        ("label", "1-8", f"{label:03o}", name),
+        ("SDI", "9-10", f"{int(parts.sdi[0]):02b}", "data in labels of 20 bits"),
+        ("data", "11-29", f"{int(parts.data[0]):019b}", f"0x{int(parts.data[0]):05x}"),
+        ("SSM", "30-31", f"{ssm:02b}", meaning),
+        ("parity", "32", f"{word >> 31}", "odd, good" if parts.parity_ok[0] else "BAD: the word is damaged"),
+    ]
+    value = f"{values.value[0]:.12g} {definition.units}" if definition and status == 0 else "none"
+    rows.append(("value", "", value, status.name))
+    return rows
+
+
+def explain_708(text: str, profile_name: str) -> list[Row]:
+    """Rows for one ARINC 708 word in hexadecimal; the header alone is enough."""
+    data = _bytes(text, (f.HEADER_708_BYTES, f.WORD_708_BYTES))
+    try:
+        profile = arinc708.load_profile(profile_name)
+    except ValueError as error:
+        raise GatewayError(str(error)) from error
+    whole = np.frombuffer(data.ljust(f.WORD_708_BYTES, b"\0"), np.uint8)[np.newaxis]
+    radial = arinc708.unpack(whole, profile)
+    bits = int.from_bytes(data[: f.HEADER_708_BYTES], "little")
+    gain = float(radial.gain_db[0])
+    meanings = {
+        "label": f"{int(radial.label[0]):03o} octal",
+        "control_accept": ("none", "indicator 1", "indicator 2", "both indicators")[int(radial.control_accept[0])],
+        "slave": "slave" if radial.slave[0] else "master",
+        "annunciations": _names(f.ANNUNCIATIONS_708, int(radial.annunciations[0])),
+        "faults": _names(profile.faults, int(radial.faults[0])),
+        "stabilised": "on" if radial.stabilised[0] else "off",
+        "mode": profile.modes[int(radial.mode[0])],
+        "tilt": f"{radial.tilt_deg[0]:+.2f} deg",
+        "gain": "calibrated" if np.isnan(gain) else ("maximum" if gain == 0 else f"{gain:g} dB"),
+        "range": f"{radial.range_nm[0]:g} NM",
+        "data_accept": ("none", "1", "2", "any")[int(radial.data_accept[0])],
+        "scan_angle": f"{radial.scan_angle_deg[0]:+.3f} deg from the {profile.scan_angle_zero}",
+    }
+    rows = [
+        (name, f"{first}-{first + width - 1}", f"{bits >> first & (1 << width) - 1:0{width}b}", meanings[name])
+        for name, (first, width) in f.HEADER_708.items()
+    ]
+    if len(data) == f.WORD_708_BYTES:
+        levels = np.bincount(radial.bins[0])
+        counts = ", ".join(f"level {level}: {count}" for level, count in enumerate(levels.tolist()) if count)
+        rows.append(("bins", f"64-{f.WORD_708_BITS - 1}", f"{profile.bins} x {profile.bits_per_bin}", counts))
+    return rows
+
+
+def _names(names: tuple[str, ...], code: int) -> str:
+    return ", ".join(name for k, name in enumerate(names) if code >> k & 1) or "none"
+
+
+def _bytes(text: str, lengths: tuple[int, ...]) -> bytes:
+    try:
+        data = bytes.fromhex(text.removeprefix("0x"))
+    except ValueError as error:
+        raise GatewayError(f"{text!r} is not hexadecimal") from error
+    if len(data) not in lengths:
+        raise GatewayError(f"{len(data)} bytes given, {' or '.join(str(n) for n in lengths)} needed")
+    return data

@@ -1,0 +1,125 @@
+"""The journal: the one thread that numbers what happened, writes it down, and only then passes it on.
+
+A record reaches the core after `write()` returned for it, so live order is file order. The journal never waits for the
+core. When the disk fails the recording stops loudly and the records still flow to the core.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from gateway.queues import ByteQueue
+from gateway.recording import Recorder
+from gateway.records import Note, Raw, Record, Stamp, Status, Tick
+
+TICK_NS = 1_000_000_000
+UTC_STEP_NS = 100_000_000  # a jump of UTC against the monotonic clock worth a note
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """What an adapter hands over: bytes with the time of reading."""
+
+    stamp: Stamp
+    adapter: str
+    data: bytes
+    dropped_before: int
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A change of state on its way to becoming a status record."""
+
+    stamp: Stamp
+    adapter: str
+    state: str
+    reason: str
+
+
+def now() -> Stamp:
+    """Both clocks of the host."""
+    return Stamp(time.monotonic_ns(), time.time_ns())
+
+
+class Journal:
+    """Takes chunks and reports from any thread; writes them; delivers them in order."""
+
+    def __init__(
+        self,
+        recorder: Recorder | None,
+        deliver: Callable[[list[Record]], None],
+        limit_bytes: int,
+        sync_interval_s: float = 1.0,
+    ) -> None:
+        self.queue: ByteQueue[Chunk | Report] = ByteQueue(limit_bytes)
+        self.recording_error = ""
+        self._recorder = recorder
+        self._deliver = deliver
+        self._sync_interval_ns = int(sync_interval_s * 1e9)
+        self._dropped: dict[str, int] = {}
+        self._sequence = 0
+        self._last_tick_ns = self._last_sync_ns = time.monotonic_ns()
+        self._utc_offset_ns: int | None = None
+
+    def chunk(self, adapter: str, data: bytes) -> None:
+        """Take bytes from an adapter's thread; without room they are dropped, and the next chunk says how many."""
+        dropped = self._dropped.get(adapter, 0)
+        if self.queue.put(Chunk(now(), adapter, data, dropped), len(data)):
+            self._dropped[adapter] = 0
+        else:
+            self._dropped[adapter] = dropped + len(data)
+
+    def report(self, adapter: str, state: str, reason: str = "") -> None:
+        """Take a change of state from any thread."""
+        self.queue.put(Report(now(), adapter, state, reason), 0)
+
+    def run(self) -> None:
+        """The work of the journal's thread, until the queue is closed and empty."""
+        while True:
+            until_tick_ns = self._last_tick_ns + TICK_NS - time.monotonic_ns()
+            items = self.queue.take(max(until_tick_ns, 0) / 1e9)
+            if items is None:
+                break
+            records = [self._numbered(item) for item in items] + self._time()
+            if records:
+                self._keep(records)
+                self._deliver(records)
+        if self._recorder and not self.recording_error:
+            self._recorder.close()
+
+    def _numbered(self, item: Chunk | Report) -> Record:
+        sequence = self._next()
+        if isinstance(item, Chunk):
+            return Raw(sequence, item.stamp, item.adapter, item.data, item.dropped_before)
+        return Status(sequence, item.stamp, item.adapter, item.state, item.reason)
+
+    def _time(self) -> list[Record]:
+        """A tick each second, and a note where UTC was stepped."""
+        stamp = now()
+        if stamp.monotonic_ns - self._last_tick_ns < TICK_NS:
+            return []
+        self._last_tick_ns = stamp.monotonic_ns
+        records: list[Record] = [Tick(self._next(), stamp)]
+        offset_ns = stamp.utc_ns - stamp.monotonic_ns
+        if self._utc_offset_ns is not None and abs(offset_ns - self._utc_offset_ns) > UTC_STEP_NS:
+            step_s = (offset_ns - self._utc_offset_ns) / 1e9
+            records.append(Note(self._next(), stamp, f"UTC of the host stepped by {step_s:+.3f} s"))
+        self._utc_offset_ns = offset_ns
+        return records
+
+    def _keep(self, records: list[Record]) -> None:
+        if not self._recorder or self.recording_error:
+            return
+        try:
+            self._recorder.append(records)
+            if records[-1].stamp.monotonic_ns - self._last_sync_ns >= self._sync_interval_ns:
+                self._recorder.sync()
+                self._last_sync_ns = records[-1].stamp.monotonic_ns
+        except OSError as error:
+            self.recording_error = f"{self._recorder.path}: {error.strerror}; make room and restart"
+            self._recorder.abandon()
+            records.append(Status(self._next(), now(), "recording", "FAILED", self.recording_error))
+
+    def _next(self) -> int:
+        self._sequence += 1
+        return self._sequence - 1

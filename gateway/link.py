@@ -1,0 +1,89 @@
+"""One bridge as the gateway knows it: its channels, its packet counter, its losses."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from decoders import formats as f
+from decoders.definitions import Definitions, for_equipment, load_definitions
+from decoders.racklink import Framer, Hello, Packet
+from gateway.config import AdapterConfig
+
+SEQUENCE_RANGE = 1 << 32
+FLAG_NAMES = {
+    f.FLAG_FIFO_OVERFLOW: "fifo_overflow",
+    f.FLAG_PARITY: "parity_error",
+    f.FLAG_CODING: "coding_error",
+    f.FLAG_WORD_LENGTH: "word_length_error",
+    f.FLAG_SYNC: "sync_error",
+}
+
+
+@dataclass(frozen=True)
+class Channel429:
+    """An ARINC 429 channel: the equipment on it and how to read its labels."""
+
+    equipment: int
+    definitions: Definitions
+    orientation: str
+
+
+@dataclass(frozen=True)
+class Channel708:
+    """An ARINC 708 channel."""
+
+    profile: str
+
+
+@dataclass
+class Link:
+    """State of one bridge, kept over reconnections."""
+
+    config: AdapterConfig
+    radar_profile: str
+    framer: Framer = field(default_factory=Framer)
+    counters: Counter[str] = field(default_factory=Counter)
+    channels: dict[int, Channel429 | Channel708] = field(default_factory=dict)
+    _next_sequence: int | None = None
+
+    def __post_init__(self) -> None:
+        for number, channel in self.config.channels.items():
+            if channel.kind == "arinc708":
+                self.channels[number] = Channel708(channel.profile or self.radar_profile)
+            elif channel.definitions:
+                definitions = load_definitions(channel.definitions)
+                self.channels[number] = Channel429(definitions.equipment_id & 0xFF, definitions, channel.orientation)
+
+    def hello(self, hello: Hello) -> None:
+        """Take what the bridge says of its channels; what the configuration says goes first."""
+        for said in hello.channels:
+            if said.channel in self.config.channels:
+                continue
+            if said.kind == f.KIND_708:
+                self.channels[said.channel] = Channel708(self.radar_profile)
+            elif said.kind in (f.KIND_429_LOW, f.KIND_429_HIGH) and said.orientation < len(f.ORIENTATIONS):
+                name = for_equipment(said.equipment_id)
+                if name is None:
+                    self.counters["channels_of_unknown_equipment"] += 1
+                else:
+                    orientation = f.ORIENTATIONS[said.orientation]
+                    self.channels[said.channel] = Channel429(said.equipment_id, load_definitions(name), orientation)
+            else:
+                self.counters["channels_of_unknown_kind"] += 1
+
+    def count(self, packet: Packet) -> None:
+        """Count the packet, the flags it carries, and the packets missing before it."""
+        self.counters["packets"] += 1
+        for bit, name in FLAG_NAMES.items():
+            if packet.flags & bit:
+                self.counters[name] += 1
+        if self._next_sequence is not None:
+            gap = (packet.sequence - self._next_sequence) % SEQUENCE_RANGE
+            if gap < SEQUENCE_RANGE // 2:
+                self.counters["packets_lost"] += gap
+            else:
+                self.counters["sequence_restarts"] += 1
+        self._next_sequence = (packet.sequence + 1) % SEQUENCE_RANGE
+
+    def all_counters(self) -> dict[str, int]:
+        """Every counter of this bridge by name."""
+        return {**self.framer.counters(), **self.counters}

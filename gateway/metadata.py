@@ -1,0 +1,61 @@
+"""What a recording says of itself: enough to replay it exactly, and to know what made it."""
+
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from gateway.config import RackConfig
+from gateway.errors import GatewayError
+from monitor.calibration import Calibration, load_calibration
+from monitor.integrity import Monitor
+from monitor.terrain import TerrainError, open_terrain
+
+
+def build_monitor(config: RackConfig, calibration: Calibration | None = None) -> Monitor | None:
+    """The monitor that a configuration asks for, or None without terrain. Raises GatewayError naming the file."""
+    if not config.terrain:
+        return None
+    try:
+        if calibration is None and config.calibration:
+            calibration = load_calibration(config.calibration)
+        return Monitor(open_terrain(config.terrain), config.monitor, calibration)
+    except (TerrainError, ValueError) as error:
+        raise GatewayError(str(error)) from error
+
+
+def describe(config: RackConfig, monitor: Monitor | None) -> dict[str, str]:
+    """The metadata of a new recording."""
+    return {
+        "configuration": config.model_dump_json(),
+        "calibration": monitor.calibration.model_dump_json() if monitor else "",
+        "terrain_checksum": monitor.terrain.checksum if monitor else "",
+        "shadebus": version("shadebus"),
+        "numpy": version("numpy"),
+        "python": platform.python_version(),
+        "host": platform.node(),
+    }
+
+
+def recorded_config(metadata: dict[str, str]) -> RackConfig:
+    """The configuration that a recording was made with."""
+    try:
+        return RackConfig.model_validate_json(metadata["configuration"])
+    except (KeyError, ValidationError) as error:
+        raise GatewayError("the recording's metadata holds no configuration that this version understands") from error
+
+
+def recorded_monitor(metadata: dict[str, str], config: RackConfig, terrain: tuple[Path, ...] = ()) -> Monitor | None:
+    """The monitor that a recording was made with; `terrain` replaces the files it was made with.
+
+    Raises GatewayError if the recorded files are not there any more or have changed.
+    """
+    calibration = Calibration.model_validate_json(metadata["calibration"]) if metadata["calibration"] else None
+    if terrain:
+        config = config.model_copy(update={"terrain": terrain})
+    monitor = build_monitor(config, calibration)
+    if monitor and not terrain and monitor.terrain.checksum != metadata["terrain_checksum"]:
+        files = ", ".join(str(path) for path in config.terrain)
+        raise GatewayError(f"{files} changed since the recording was made: name the terrain to use with --dem")
+    return monitor

@@ -1,0 +1,201 @@
+"""Records to events: the one way through decoding and monitoring, live and in replay alike.
+
+Reads no clock: whatever depends on time depends on the stamps of the records, ticks included.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from decoders import arinc429, arinc708
+from decoders import formats as f
+from decoders.racklink import MalformedBody, Packet, hello, radar_word, words429
+from gateway.config import RackConfig
+from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
+from gateway.link import Channel429, Channel708, Link
+from gateway.records import Note, Raw, Record, Status, Tick
+from gateway.timebase import Timebase
+from monitor.aircraft import Aircraft, status_name
+from monitor.integrity import Comparison, Monitor, Verdict
+from monitor.scans import Scan, ScanBuilder
+
+SPOILT = f.FLAG_CODING | f.FLAG_WORD_LENGTH | f.FLAG_SYNC  # words whose bits cannot be trusted
+QUIET_NS = 5_000_000_000
+LATEST_DEVICE_NS = 1 << 62  # far beyond any clock, and far from overflow
+
+RADAR = "radar"  # the name under which the radar's silence is told, whatever its bridge still sends
+
+Watcher = Callable[[Scan, Verdict, Comparison | None], None]
+
+
+class Pipeline:
+    """Feed it records in order; it gives events. `watcher` sees each scan with its verdict, for reports."""
+
+    def __init__(self, config: RackConfig, monitor: Monitor | None, watcher: Watcher | None = None) -> None:
+        self._config = config
+        self._monitor = monitor
+        self._watcher = watcher
+        self._links = {a.name: Link(a, config.radar_profile) for a in config.adapters}
+        self._timebase = Timebase()
+        self._aircraft = Aircraft()
+        self._scans = ScanBuilder()
+        self._counters: Counter[str] = Counter()
+        self._now_ns = 0  # common time of the latest word
+        self._heard: dict[str, int] = {}  # adapter -> monotonic time of its last chunk
+        self._quiet: set[str] = set()
+        self._losses: list[str] = []  # what the next verdict must own up to
+        self._scan_number = 0
+        self._last: Record | None = None
+
+    def feed(self, record: Record) -> Iterator[Event]:
+        """The events that one record causes."""
+        self._last = record
+        if isinstance(record, Raw):
+            yield from self._raw(record)
+        elif isinstance(record, Status):
+            self._counters[f"{record.adapter}.{record.state.lower()}"] += 1
+            if record.state in ("LOST", "BEHIND", "FAILED"):
+                self._losses.append(f"degraded: {record.adapter} {record.state}: {record.reason}")
+            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, record.state, record.reason)
+        elif isinstance(record, Note):
+            yield StatusEvent(record.stamp.utc_ns, record.sequence, "host", "NOTE", record.text)
+        else:
+            yield from self._tick(record)
+
+    def finish(self) -> Iterator[Event]:
+        """The sweep that is still open, and the summary of every counter."""
+        if self._last is None:
+            return
+        for scan in self._scans.finish():
+            yield from self._judge(scan, self._last)
+        counters = dict(self._counters) | {"clock_restarts": self._timebase.restarts}
+        for name, link in self._links.items():
+            counters |= {f"{name}.{key}": value for key, value in link.all_counters().items()}
+        yield SummaryEvent(self._last.stamp.utc_ns, self._last.sequence, dict(sorted(counters.items())))
+
+    def _raw(self, record: Raw) -> Iterator[Event]:
+        link = self._links.get(record.adapter)
+        if link is None:
+            self._counters["chunks_of_unknown_adapter"] += 1
+            return
+        link.counters["chunks"] += 1
+        link.counters["bytes_dropped"] += record.dropped_before
+        if record.dropped_before:
+            self._losses.append(f"degraded: {record.dropped_before} bytes of {record.adapter} were dropped")
+        yield from self._hear(record.adapter, record)
+        for packet in link.framer.feed(record.data):
+            link.count(packet)
+            try:
+                yield from self._packet(link, packet, record)
+            except MalformedBody:
+                link.counters["malformed_bodies"] += 1
+
+    def _hear(self, source: str, record: Raw) -> Iterator[Event]:
+        self._heard[source] = record.stamp.monotonic_ns
+        if source in self._quiet:
+            self._quiet.discard(source)
+            yield StatusEvent(record.stamp.utc_ns, record.sequence, source, "HEARD", "words come again")
+
+    def _packet(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
+        if packet.time_ns > LATEST_DEVICE_NS:
+            raise MalformedBody("device time is beyond any clock")
+        if packet.type == f.HELLO:
+            link.hello(hello(packet))
+        elif packet.type == f.WORDS_429:
+            self._words(link, packet, record)
+        elif packet.type == f.WORD_708:
+            yield from self._radar(link, packet, record)
+        elif packet.type not in (f.HEARTBEAT, f.TIME_MARK):
+            link.counters["packets_of_unknown_type"] += 1
+
+    def _words(self, link: Link, packet: Packet, record: Raw) -> None:
+        block = words429(packet)
+        link.counters["words_429"] += len(block.words)
+        if not block.well_formed:
+            link.counters["malformed_bodies"] += 1
+        channel = link.channels.get(packet.channel)
+        if not isinstance(channel, Channel429) or packet.flags & SPOILT or not len(block.words):
+            link.counters["words_429_unused"] += len(block.words)
+            return
+        values = arinc429.decode(block.words, channel.definitions, channel.orientation)
+        for status, count in enumerate(np.bincount(values.status).tolist()):
+            if status and count:
+                link.counters[f"words_429_{arinc429.Status(status).name.lower()}"] += count
+        times = block.time_ns + self._timebase.offset_ns(record.adapter, packet.time_ns, record.stamp.monotonic_ns)
+        self._now_ns = int(times[-1])
+        self._aircraft.feed(channel.equipment, times, block.words, values)
+
+    def _radar(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
+        word = radar_word(packet)
+        link.counters["words_708"] += 1
+        channel = link.channels.get(packet.channel)
+        if not isinstance(channel, Channel708) or packet.flags & SPOILT or word.bit_count != f.WORD_708_BITS:
+            link.counters["words_708_unused"] += 1
+            return
+        yield from self._hear(RADAR, record)
+        radials = arinc708.unpack(np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile)
+        offset = self._timebase.offset_ns(record.adapter, packet.time_ns, record.stamp.monotonic_ns)
+        self._now_ns = packet.time_ns + offset
+        for scan in self._scans.feed(np.array([self._now_ns]), radials):
+            yield from self._judge(scan, record)
+
+    def _judge(self, scan: Scan, record: Record) -> Iterator[Event]:
+        stamp = record.stamp.utc_ns, record.sequence
+        self._scan_number = scan.number
+        yield ScanEvent(
+            *stamp,
+            scan=scan.number,
+            radials=len(scan.time_ns),
+            sector_deg=scan.sector_deg,
+            range_nm=scan.range_nm,
+            tilt_deg=scan.tilt_deg,
+            gaps=scan.missing,
+            repeated=scan.repeated,
+        )
+        if self._monitor is None:
+            return
+        verdict, comparison = self._monitor.judge(scan, self._aircraft)
+        verdict = replace(verdict, reasons=verdict.reasons + tuple(self._losses))
+        self._losses.clear()
+        if self._watcher:
+            self._watcher(scan, verdict, comparison)
+        yield self._verdict(verdict, self._monitor, record)
+
+    def _verdict(self, verdict: Verdict, monitor: Monitor, record: Record) -> IntegrityEvent:
+        self._counters[f"verdicts_{verdict.verdict}"] += 1
+        settings = monitor.settings
+        stamp = record.stamp.utc_ns, record.sequence
+        return IntegrityEvent(*stamp, method=settings.method, p_fa=settings.p_fa, **vars(verdict))
+
+    def _tick(self, record: Tick) -> Iterator[Event]:
+        stamp = record.stamp.utc_ns, record.sequence
+        for source, heard_ns in self._heard.items():
+            silent_ns = record.stamp.monotonic_ns - heard_ns
+            if silent_ns > QUIET_NS and source not in self._quiet:
+                self._quiet.add(source)
+                reason = f"no words for {silent_ns / 1e9:.1f} s"
+                yield StatusEvent(*stamp, source, "QUIET", reason)
+                if source == RADAR:
+                    for scan in self._scans.finish():
+                        yield from self._judge(scan, record)
+                    if self._monitor:
+                        silence = self._monitor.unavailable(self._scan_number, [f"radar: {reason}"])
+                        yield self._verdict(silence, self._monitor, record)
+        yield self._state(record)
+
+    def _state(self, record: Tick) -> StateEvent:
+        silent_ns = record.stamp.monotonic_ns - max(self._heard.values(), default=record.stamp.monotonic_ns)
+        now_ns = self._now_ns + silent_ns  # without words the state must still grow old
+        values: dict[str, float | None] = {}
+        validity: dict[str, str] = {}
+        age_s: dict[str, float | None] = {}
+        for name, track in self._aircraft.tracks.items():
+            at = track.at(np.array([now_ns]))
+            status = int(at.status[0])
+            values[name] = float(at.value[0]) if status == 0 else None
+            validity[name] = status_name(status)
+            newest = track.newest
+            age_s[name] = (now_ns - newest[0]) / 1e9 if newest else None
+        return StateEvent(record.stamp.utc_ns, record.sequence, values, validity, age_s)

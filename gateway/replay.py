@@ -1,0 +1,43 @@
+"""Replay: the records of a file through the same core as live."""
+
+import time
+from collections.abc import Callable
+
+from gateway.config import RackConfig
+from gateway.core import Core, Emit
+from gateway.pipeline import Pipeline, Watcher
+from gateway.recording import Recording
+from monitor.integrity import Monitor
+
+
+def replay(
+    recording: Recording,
+    config: RackConfig,
+    monitor: Monitor | None,
+    emit: Emit,
+    report: Callable[[str], None],
+    *,
+    watcher: Watcher | None = None,
+    speed: float | None = None,
+    start_s: float = 0.0,
+    stop_s: float | None = None,
+) -> int:
+    """Emit the events of a recording, as fast as possible or at `speed` times real time; return the core's failures.
+
+    `start_s` and `stop_s` count from the first record; what lies outside is not fed at all.
+    """
+    core = Core(lambda: Pipeline(config, monitor, watcher), emit, report)
+    began_ns = time.monotonic_ns()
+    first_ns: int | None = None
+    for record in recording:
+        first_ns = record.stamp.monotonic_ns if first_ns is None else first_ns
+        elapsed_s = (record.stamp.monotonic_ns - first_ns) / 1e9
+        if stop_s is not None and elapsed_s > stop_s:
+            break
+        if elapsed_s < start_s:
+            continue
+        if speed:
+            time.sleep(max(0.0, (elapsed_s - start_s) / speed - (time.monotonic_ns() - began_ns) / 1e9))
+        core.process(record)
+    core.finish()
+    return core.failures

@@ -1,0 +1,106 @@
+"""The gateway as a whole: adapters, journal and core, started and stopped in the order that loses nothing."""
+
+import threading
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+from gateway.adapters import make_adapter
+from gateway.config import RackConfig
+from gateway.core import Core, CoreQueue, Emit
+from gateway.errors import GatewayError
+from gateway.journal import Journal
+from gateway.metadata import describe
+from gateway.pipeline import Pipeline, Watcher
+from gateway.recording import Recorder
+from gateway.supervision import Supervisor
+from gateway.threads import GuardedThread
+from monitor.integrity import Monitor
+from monitor.warmup import warm_up
+
+FIRST_OPEN_S = 3.0
+POLL_S = 0.1
+
+
+class Service:
+    """Runs until stopped. `failures` says what broke: a run with any ends with a non-zero exit."""
+
+    def __init__(self, config: RackConfig, monitor: Monitor | None, emit: Emit, watcher: Watcher | None = None) -> None:
+        self.failures: list[str] = []
+        self.broken = threading.Event()  # set when a thread that the gateway cannot do without has died
+        self.recording_path: Path | None = None
+        self._config = config
+        recorder = self._recorder(monitor)
+        limit_bytes = (config.recording.queue_mib if config.recording else 64) << 20
+        sync_s = config.recording.sync_interval_s if config.recording else 1.0
+        self._to_core = CoreQueue(lambda reason: self._journal.report("core", "BEHIND", reason))
+        self._journal = Journal(recorder, self._to_core.deliver, limit_bytes, sync_s)
+        core = Core(lambda: Pipeline(config, monitor, watcher), emit, self._core_failed)
+
+        def core_work() -> None:
+            if monitor:
+                warm_up(monitor)  # the journal records meanwhile
+            self._to_core.run(core)
+
+        self._supervisors = [
+            Supervisor(a.name, make_adapter(a), self._journal.chunk, self._journal.report) for a in config.adapters
+        ]
+        self._core_thread = self._thread("core", core_work)
+        self._journal_thread = self._thread("journal", self._journal.run)
+        self._adapter_threads = [self._thread(f"adapter {s.name}", s.run) for s in self._supervisors]
+
+    def start(self) -> None:
+        """Start every thread. Raises GatewayError if a device cannot be opened and the configuration does not wait."""
+        self._core_thread.start()
+        self._journal_thread.start()
+        for thread in self._adapter_threads:
+            thread.start()
+        if not self._config.wait_for_devices:
+            errors = [error for s in self._supervisors if (error := s.first_error(FIRST_OPEN_S))]
+            if errors:
+                self.stop()
+                raise GatewayError("; ".join(errors))
+
+    def run_until(self, stop: threading.Event, seconds: float | None = None) -> None:
+        """Run until `stop` is set, the time is over, or a thread that the gateway needs has died."""
+        self.start()
+        deadline = time.monotonic() + seconds if seconds is not None else None
+        while not stop.is_set() and not self.broken.is_set():
+            if deadline is not None and time.monotonic() >= deadline:
+                break
+            stop.wait(POLL_S)
+        self.stop()
+
+    def stop(self) -> None:
+        """Stop reading, write down what was read, answer what was written, then return."""
+        for supervisor in self._supervisors:
+            supervisor.stop()
+        for thread in self._adapter_threads:
+            thread.join()
+        self._journal.queue.close()
+        self._journal_thread.join()
+        self._to_core.queue.close()
+        self._core_thread.join()
+        if self._journal.recording_error:
+            self.failures.append(f"recording stopped: {self._journal.recording_error}")
+
+    def _recorder(self, monitor: Monitor | None) -> Recorder | None:
+        if self._config.recording is None:
+            return None
+        name = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ.mcap")
+        self.recording_path = self._config.recording.directory / name
+        return Recorder(self.recording_path, describe(self._config, monitor))
+
+    def _thread(self, name: str, work: Callable[[], None]) -> GuardedThread:
+        return GuardedThread(name, work, self._died)
+
+    def _core_failed(self, reason: str) -> None:
+        self.failures.append(f"core: {reason}")
+        self._journal.report("core", "FAILED", reason)
+
+    def _died(self, name: str, error: BaseException) -> None:
+        reason = f"{type(error).__name__}: {error}"
+        self.failures.append(f"thread {name} died: {reason}")
+        self._journal.report(name, "DIED", reason)
+        self.broken.set()

@@ -1,0 +1,76 @@
+"""One thread per adapter: open, read until it fails, say so, wait, open again, for ever.
+
+CLOSED -> OPENING -> UP -> LOST -> OPENING ... Every change is a recorded status with its reason.
+"""
+
+import threading
+from collections.abc import Callable
+
+from gateway.adapters import Adapter, Port
+from gateway.errors import GatewayError
+
+FIRST_WAIT_S, LONGEST_WAIT_S = 0.5, 5.0
+
+Report = Callable[[str, str, str], None]  # adapter, state, reason
+Deliver = Callable[[str, bytes], None]  # adapter, chunk
+
+
+class Supervisor:
+    """Keeps one adapter open and passes its chunks on. Whatever the driver raises is a status, and then a retry."""
+
+    def __init__(self, name: str, adapter: Adapter, deliver: Deliver, report: Report) -> None:
+        self.name = name
+        self._adapter = adapter
+        self._deliver = deliver
+        self._report = report
+        self._stopping = threading.Event()
+        self._first_open = threading.Event()
+        self._first_error = ""
+
+    def run(self) -> None:
+        """The work of the adapter's thread, until `stop`."""
+        wait_s = FIRST_WAIT_S
+        while not self._stopping.is_set():
+            self._state("OPENING")
+            try:
+                port = self._adapter.open()
+            except Exception as error:  # noqa: BLE001 # drivers raise anything, and none of it may end the thread
+                self._first_error = self._first_error or _reason(error)
+                self._first_open.set()
+                self._state("LOST", _reason(error))
+                self._stopping.wait(wait_s)
+                wait_s = min(2 * wait_s, LONGEST_WAIT_S)
+                continue
+            wait_s = FIRST_WAIT_S
+            self._first_open.set()
+            self._state("UP")
+            self._read(port)
+            self._stopping.wait(wait_s)
+        self._state("CLOSED")
+
+    def first_error(self, timeout_s: float) -> str:
+        """Why the first attempt to open failed, or nothing if it did not within the time."""
+        self._first_open.wait(timeout_s)
+        return self._first_error
+
+    def stop(self) -> None:
+        """Ask the thread to end; it does within a read's wait."""
+        self._stopping.set()
+
+    def _read(self, port: Port) -> None:
+        try:
+            while not self._stopping.is_set():
+                chunk = port.read()
+                if chunk:
+                    self._deliver(self.name, chunk)
+        except Exception as error:  # noqa: BLE001 # pyserial alone raises four unrelated kinds on unplugging
+            self._state("LOST", _reason(error))
+        finally:
+            port.close()
+
+    def _state(self, state: str, reason: str = "") -> None:
+        self._report(self.name, state, reason)
+
+
+def _reason(error: Exception) -> str:
+    return str(error) if isinstance(error, GatewayError) else f"{type(error).__name__}: {error}"
