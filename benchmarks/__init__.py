@@ -1,0 +1,1 @@
+"""Measurements: rates of false and true alerts, and speed as ratios to a named rival."""

@@ -1,0 +1,66 @@
+"""Simulated flights through the decoders and the monitor, byte for byte, as fast as they compute."""
+
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.config import check_config
+from gateway.metadata import build_monitor
+from gateway.pipeline import Pipeline
+from gateway.records import Raw, Stamp
+from monitor.calibration import Calibration
+from monitor.integrity import Comparison, Verdict
+from monitor.scans import Scan
+from simulators.scenario import Scenario
+from simulators.traffic import traffic
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A scenario, the terrain that the monitor has of it, and how it is to judge."""
+
+    scenario: Scenario
+    terrain: Path
+    p_fa: float
+    calibration: Calibration | None = None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One scan of a flight: its verdict, and the disparities behind it (n,), range bins."""
+
+    verdict: Verdict
+    disparities: NDArray[np.float64]
+
+
+def fly(flight: Flight) -> list[Judged]:
+    """The judged scans of a flight, in order."""
+    rack = {
+        "adapters": [{"name": "bridge", "source": "serial:none"}],
+        "terrain": [flight.terrain],
+        "radar_profile": flight.scenario.radar.payload,
+        "monitor": {"p_fa": flight.p_fa},
+    }
+    config = check_config(rack, "flight")
+    judged: list[Judged] = []
+
+    def watch(_: Scan, verdict: Verdict, comparison: Comparison | None) -> None:
+        judged.append(Judged(verdict, comparison.disparities if comparison else np.empty(0)))
+
+    pipeline = Pipeline(config, build_monitor(config, flight.calibration), watch)
+    for number, (time_ns, data) in enumerate(traffic(flight.scenario)):
+        for _ in pipeline.feed(Raw(number, Stamp(time_ns, time_ns), "bridge", data)):
+            pass
+    for _ in pipeline.finish():
+        pass
+    return judged
+
+
+def fly_all(flights: list[Flight]) -> Iterator[list[Judged]]:
+    """The judged scans of many flights, in order, on all cores."""
+    with ProcessPoolExecutor() as pool:
+        yield from pool.map(fly, flights, chunksize=4)
