@@ -1,0 +1,216 @@
+"""ARINC 429 label definitions: what the bits of a label mean on one kind of equipment, read from TOML and checked.
+
+A label means different things on different equipment, so definitions come in named sets that a bus port chooses.
+Nothing here packs or unpacks a word: decoders and simulators read the same rows and share no more than them.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from decoders.formats import SSM_TABLES
+
+LABELS_FILE: Final = Path(__file__).with_name("labels.toml")
+EXACT: Final = 2**53  # integers up to here are exact as floats, so that a value is rounded once at most
+
+# The set for an equipment that a bridge announces by the low byte of its id.
+SET_OF_EQUIPMENT: Final = {0x0B: "gnss_743a", 0x04: "iru_704", 0x06: "adc_706", 0x07: "ra_707", 0x38: "adiru_738"}
+
+
+class Encoding(NamedTuple):
+    """What an encoding asks of a row: keys it must have, default SSM table and bits, and fixed units."""
+
+    needs: frozenset[str]
+    ssm: str
+    bits: tuple[int, int] = (11, 29)
+    units: str = ""
+
+
+ENCODINGS: Final = {
+    "bnr": Encoding(frozenset({"bits", "range", "lsb", "units"}), "bnr"),
+    "bnr_unsigned": Encoding(frozenset({"bits", "range", "lsb", "units"}), "bnr"),
+    "bcd": Encoding(frozenset({"bits", "lsb", "units"}), "bcd"),
+    "disc": Encoding(frozenset(), "disc"),
+    "time": Encoding(frozenset(), "bnr", (12, 28), "s"),
+    "date": Encoding(frozenset(), "bcd", units="days since 2000-01-01"),
+}
+ROW_NEEDS: Final = frozenset({"label", "name", "encoding", "source", "confidence"})
+ROW_MAY_HAVE: Final = frozenset({"ssm", "fields"})
+SET_KEYS: Final = frozenset({"equipment_id", "extends", "rows"})
+
+
+class DefinitionError(ValueError):
+    """A definition file contradicts itself or the standard; the message names the file, the set and the label."""
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """One label. `bits` are the first and last of the value, without the sign bit (29) of a "bnr" row.
+
+    `value = integer * lsb`, in `units`, exactly. `fields` are the discrete bits beside or, in a "disc" row, inside the
+    value: name -> first and last bit. `ssm` names a row of `decoders.formats.SSM_TABLES`.
+    """
+
+    label: int
+    name: str
+    encoding: str
+    bits: tuple[int, int]
+    lsb: Fraction
+    range: Fraction | None
+    units: str
+    ssm: str
+    fields: Mapping[str, tuple[int, int]]
+    source: str
+    confidence: str
+
+    @property
+    def has_sdi(self) -> bool:
+        """Whether bits 9-10 are a source/destination identifier; in a 20-bit word they are data."""
+        return self.bits[0] > 10
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Definitions:
+    """One set: `labels` maps the conventional label (0o310) to its definition."""
+
+    name: str
+    equipment_id: int
+    labels: Mapping[int, Definition]
+
+
+@cache
+def load_definitions(name_or_path: str | Path) -> Definitions:
+    """The named set of `labels.toml` ("gnss_743a", "iru_704", ...), or the one set of a TOML file of the same form.
+
+    A set that `extends` a named one has its labels too, except those it defines itself. A set is read once a process.
+
+    Raises DefinitionError if a row is refused, ValueError for an unknown name, OSError if a file cannot be read.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        return _named(str(name_or_path))
+    tables = _read(path)
+    if len(tables) != 1:
+        raise DefinitionError(f"{path} has {len(tables)} sets: put exactly one in a definition file")
+    return _set(path, next(iter(tables)), tables)
+
+
+def for_equipment(equipment_id_low_byte: int) -> str | None:
+    """The set for the low byte of an equipment id (0x0B -> "gnss_743a"); None for one that has no set."""
+    return SET_OF_EQUIPMENT.get(equipment_id_low_byte)
+
+
+def _named(name: str) -> Definitions:
+    tables = _read(LABELS_FILE)
+    if name not in tables:
+        raise ValueError(f"no definitions {name!r}: name one of {', '.join(tables)} or a .toml file")
+    return _set(LABELS_FILE, name, tables)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    # Decimal fractions are kept exact: 0.1 and 4.096 have no exact float.
+    try:
+        return tomllib.loads(path.read_text("utf-8"), parse_float=Fraction)
+    except tomllib.TOMLDecodeError as error:
+        raise DefinitionError(f"{path} is no TOML: {error}") from error
+
+
+def _set(path: Path, name: str, tables: dict[str, Any]) -> Definitions:
+    where = f"{path.name} [{name}]"
+    table = tables[name]
+    if not isinstance(table, dict) or not {"equipment_id", "rows"} <= table.keys() <= SET_KEYS:
+        raise DefinitionError(f"{where}: a set has equipment_id, rows and perhaps extends, nothing else")
+    labels: dict[int, Definition] = {}
+    for row in table["rows"]:
+        if not isinstance(row, dict):
+            raise DefinitionError(f"{where}: {row!r} is no row; write {{ label = ..., name = ..., ... }}")
+        definition = _definition(f"{where} label {row.get('label', '?')}", row)
+        if definition.label in labels:
+            raise DefinitionError(f"{where} label {row['label']}: defined twice")
+        labels[definition.label] = definition
+    inherited = _named(table["extends"]).labels if "extends" in table else {}
+    return Definitions(name, table["equipment_id"], {**inherited, **labels})
+
+
+def _definition(where: str, row: dict[str, Any]) -> Definition:
+    if row.get("encoding") not in ENCODINGS:
+        raise DefinitionError(f"{where}: unknown encoding {row.get('encoding')!r}, use one of {', '.join(ENCODINGS)}")
+    encoding = ENCODINGS[row["encoding"]]
+    _check_keys(where, row, encoding)
+    try:
+        definition = Definition(
+            label=int(row["label"], 8),
+            name=row["name"],
+            encoding=row["encoding"],
+            bits=_bits(row["bits"]) if "bits" in row else encoding.bits,
+            lsb=_exact(row.get("lsb", 1)),
+            range=_exact(row["range"]) if "range" in row else None,
+            units=row.get("units", encoding.units),
+            ssm=row.get("ssm", encoding.ssm),
+            fields={name: _bits(bits) for name, bits in row.get("fields", {}).items()},
+            source=row["source"],
+            confidence=row["confidence"],
+        )
+    except (AttributeError, TypeError, ValueError, ZeroDivisionError) as error:
+        raise DefinitionError(f"{where}: {error}") from error
+    _check(where, definition)
+    return definition
+
+
+def _bits(bits: int | list[int]) -> tuple[int, int]:
+    first, last = (bits, bits) if isinstance(bits, int) else bits
+    if not 9 <= first <= last <= 29:
+        raise ValueError(f"bits {first} to {last} are not data bits, which are 9 to 29 in rising order")
+    return first, last
+
+
+def _exact(number: int | str | Fraction) -> Fraction:
+    """An exact number from 0.125 or from text such as "180/2^20"."""
+    if isinstance(number, str):
+        numerator, _, power = number.partition("/2^")
+        return Fraction(numerator) / Fraction(2) ** int(power or 0)
+    return Fraction(number)
+
+
+def _check_keys(where: str, row: dict[str, Any], encoding: Encoding) -> None:
+    needs = ROW_NEEDS | encoding.needs
+    may_have = needs | ROW_MAY_HAVE | ({"bits"} if row["encoding"] == "disc" else frozenset())
+    if missing := needs - row.keys():
+        raise DefinitionError(f"{where}: {row['encoding']} needs {', '.join(sorted(missing))}")
+    if unknown := row.keys() - may_have:
+        raise DefinitionError(f"{where}: unknown for {row['encoding']}: {', '.join(sorted(unknown))}")
+
+
+def _check(where: str, definition: Definition) -> None:
+    first, last = definition.bits
+    width = last - first + 1
+    if not 0 <= definition.label <= 0o377:
+        raise DefinitionError(f"{where}: a label is octal 000 to 377")
+    if definition.ssm not in SSM_TABLES:
+        raise DefinitionError(f"{where}: unknown ssm {definition.ssm!r}, use one of {', '.join(SSM_TABLES)}")
+    if definition.encoding == "bnr" and last != 28:
+        raise DefinitionError(f"{where}: bnr bits end at 28, below the sign in bit 29")
+    if definition.range is not None and definition.lsb != definition.range / 2**width:
+        raise DefinitionError(f"{where}: the LSB is not range / 2^{width} = {definition.range / 2**width}")
+    if definition.lsb <= 0 or max(definition.lsb.numerator << width, definition.lsb.denominator) > EXACT:
+        raise DefinitionError(f"{where}: the LSB {definition.lsb} is not positive or too fine to be exact")
+    _check_overlap(where, definition)
+
+
+def _check_overlap(where: str, definition: Definition) -> None:
+    taken = {} if definition.encoding == "disc" else dict.fromkeys(_span(definition.bits), "the value")
+    if definition.encoding == "bnr":
+        taken[29] = "the sign"
+    for name, bits in definition.fields.items():
+        for bit in _span(bits):
+            if bit in taken:
+                raise DefinitionError(f"{where}: bit {bit} of {name} overlaps {taken[bit]}")
+            taken[bit] = name
+
+
+def _span(bits: tuple[int, int]) -> range:
+    return range(bits[0], bits[1] + 1)

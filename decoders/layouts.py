@@ -1,0 +1,85 @@
+"""Byte layouts as `construct` declarations: the executable specification of RackLink 1 and of the ARINC 708 header.
+
+They are written field by field in the order of the wire, apart from the tables of `decoders.formats`, so that the
+fast readers can be tested against something that was not derived from them. In service they read only the rare packets.
+"""
+
+from typing import Any
+
+from construct import (
+    BitsInteger,
+    BitsSwapped,
+    BitStruct,
+    Byte,
+    Bytes,
+    Const,
+    Construct,
+    ExprAdapter,
+    Flag,
+    GreedyRange,
+    Int16ul,
+    Int32ul,
+    Int64ul,
+    Padding,
+    Struct,
+    Terminated,
+    this,
+)
+
+PACKET_HEADER = Struct(
+    "version" / Const(1, Byte),
+    "type" / Byte,
+    "channel" / Byte,
+    "flags" / Byte,
+    "sequence" / Int32ul,
+    "time_ns" / Int64ul,
+)
+
+HELLO = Struct(
+    "serial_number" / Int32ul,
+    "firmware" / Int16ul,
+    "channels" / GreedyRange(Struct("channel" / Byte, "kind" / Byte, "orientation" / Byte, "equipment_id" / Byte)),
+    Terminated,
+)
+
+HEARTBEAT = Struct(
+    "channels" / GreedyRange(Struct("channel" / Byte, "received" / Int32ul, "lost" / Int32ul)),
+    Terminated,
+)
+
+TIME_MARK = Struct("edge_time_ns" / Int64ul, Terminated)
+
+WORDS_429 = Struct("words" / GreedyRange(Struct("offset_ns" / Int32ul, "word" / Int32ul)), Terminated)
+
+WORD_708 = Struct("bit_count" / Int16ul, "data" / Bytes((this.bit_count + 7) // 8), Terminated)
+
+
+def _lsb_first(width: int) -> "Construct[Any, Any]":
+    """An unsigned integer of `width` bits, the least significant sent first."""
+    return ExprAdapter(
+        Bytes(width),
+        lambda bits, _: sum(bit << place for place, bit in enumerate(bits)),
+        lambda value, _: bytes(value >> place & 1 for place in range(width)),
+    )
+
+
+# Bit 0 of the radar word is the least significant bit of its first byte, hence the swap.
+RADAR_HEADER = BitsSwapped(
+    BitStruct(
+        "label" / BitsInteger(8),
+        "control_accept" / _lsb_first(2),
+        "slave" / Flag,
+        Padding(2),
+        "annunciations" / _lsb_first(5),
+        "faults" / _lsb_first(7),
+        "stabilised" / Flag,
+        "mode" / _lsb_first(3),
+        "tilt" / _lsb_first(7),
+        "gain" / _lsb_first(6),
+        "range" / _lsb_first(6),
+        "spare_48" / Flag,
+        "data_accept" / _lsb_first(2),
+        "scan_angle" / _lsb_first(12),
+        Padding(1),
+    )
+)

@@ -1,0 +1,255 @@
+"""RackLink 1 packets out of any byte stream: each byte received is framed, skipped or pending, and counted as such.
+
+`Framer.feed` never raises on data. The body readers raise `MalformedBody` for a packet whose CRC is good and whose
+body is not what its type says, so that the caller can count it; its bytes stay in the recording.
+"""
+
+import re
+import struct
+import zlib
+from typing import Any, Final, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from cobs import cobs
+
+from decoders import formats as f
+
+HEADER: Final = struct.Struct(f.LINK_HEADER)
+PACKET_START: Final = re.compile(rb"(?=[\x03-\xff]\x01)")  # a COBS code that spans the version, 1, and a type
+CRC: Final = struct.Struct("<I")
+ENTRY_429: Final = np.dtype([("offset_ns", "<u4"), ("word", "<u4")])
+TIME_LIMIT_NS: Final = 2**63 - 2**32  # a device time above it, 292 years, would overflow once an offset is added
+
+
+class MalformedBody(ValueError):
+    """The body of an intact packet contradicts the packet's type."""
+
+
+class Packet(NamedTuple):
+    """An intact packet, of a known type or not. `time_ns` is the device clock at the start of the first word."""
+
+    type: int
+    channel: int
+    flags: int
+    sequence: int
+    time_ns: int
+    body: bytes
+
+
+class TimedWords(NamedTuple):
+    """All whole entries of an ARINC 429 packet: `time_ns` i8 (n,) device clock, `words` u4 (n,), bit 1 the LSB."""
+
+    time_ns: npt.NDArray[np.int64]
+    words: npt.NDArray[np.uint32]
+    leftover_bytes: int  # after the last whole entry
+    well_formed: bool  # 1 to 256 entries and nothing left over
+
+
+class RadarWord(NamedTuple):
+    """An ARINC 708 word as received: 1600 bits if it is a normal one. `data` has ceil(bit_count / 8) bytes."""
+
+    bit_count: int
+    data: bytes
+
+
+class HelloChannel(NamedTuple):
+    """One channel a bridge announces; codes as in `decoders.formats`, the equipment id is its low byte."""
+
+    channel: int
+    kind: int
+    orientation: int
+    equipment_id: int
+
+
+class Hello(NamedTuple):
+    """What a bridge is and has."""
+
+    serial_number: int
+    firmware: int
+    channels: tuple[HelloChannel, ...]
+
+
+class ChannelCount(NamedTuple):
+    """Words a bridge has received on a channel, and words it has lost itself."""
+
+    channel: int
+    received: int
+    lost: int
+
+
+class Framer:
+    """Cuts a byte stream into packets; the outcome does not depend on how the stream is cut into pieces.
+
+    Bytes: `received` = `framed` + `skipped` + `pending` after every call. `framed` counts intact packets with their
+    closing 0x00, `skipped` all else that is finished with. Faults, once each: `bad_cobs`; `bad_crc`, also for a packet
+    too short to hold a header and a CRC; `oversize`. `unknown_version` packets are intact and framed, but no Packet
+    comes out, since nothing is known of their header. `pending` never exceeds the largest encoded packet.
+
+    A packet that was cut short has lost its 0x00 too and runs into its neighbour; garbage does the same. So a faulty
+    run is searched for a packet that ends it, and noise costs no more than itself.
+    """
+
+    def __init__(self) -> None:
+        self.received = self.framed = self.skipped = 0
+        self.bad_crc = self.bad_cobs = self.oversize = self.unknown_version = 0
+        self._run = bytearray()  # since the last 0x00, or its newest bytes if it is over-long
+        self._overlong = False
+
+    @property
+    def pending(self) -> int:
+        """Bytes kept for the next call."""
+        return len(self._run)
+
+    def counters(self) -> dict[str, int]:
+        """Every counter by name."""
+        names = ("received", "framed", "skipped", "pending", "bad_crc", "bad_cobs", "oversize", "unknown_version")
+        return {name: getattr(self, name) for name in names}
+
+    def feed(self, data: bytes) -> list[Packet]:
+        """Packets completed by the next bytes of a stream (COBS, each closed by 0x00)."""
+        self.received += len(data)
+        *closed, rest = data.split(b"\0")
+        packets = []
+        for run in closed:
+            self._extend(run)
+            if (packet := self._close()) is not None:
+                packets.append(packet)
+        self._extend(rest)
+        self._check_books()
+        return packets
+
+    def feed_datagram(self, data: bytes) -> list[Packet]:
+        """The packet of one UDP datagram, which has neither COBS nor a closing 0x00."""
+        self.received += len(data)
+        packet = self._account(_parsed(data), len(data))
+        self._check_books()
+        return [] if packet is None else [packet]
+
+    def _extend(self, run: bytes) -> None:
+        self._run += run
+        excess = len(self._run) - f.LINK_MAX_ENCODED_BYTES
+        if excess > 0:
+            self.oversize += not self._overlong
+            self._overlong = True
+            self.skipped += excess
+            del self._run[:excess]
+
+    def _close(self) -> Packet | None:
+        run, overlong = bytes(self._run), self._overlong
+        self._run.clear()
+        self._overlong = False
+        if not run:
+            self.skipped += 1
+            return None
+        whole = None if overlong else _unstuffed(run)
+        if isinstance(whole, Packet) or whole == "unknown_version":
+            return self._account(whole, len(run) + 1)
+        for start in PACKET_START.finditer(run, 0 if overlong else 1):
+            packet = _unstuffed(run[start.start() :])
+            if isinstance(packet, Packet):
+                self._account(whole, start.start())
+                return self._account(packet, len(run) - start.start() + 1)
+        return self._account(whole, len(run) + 1)
+
+    def _account(self, outcome: "Packet | Fault | None", size: int) -> Packet | None:
+        """Count `size` bytes and what became of them; None stands for a run whose fault is counted already."""
+        if isinstance(outcome, Packet):
+            self.framed += size
+            return outcome
+        if outcome == "unknown_version":
+            self.framed += size
+        else:
+            self.skipped += size
+        if outcome is not None:
+            setattr(self, outcome, getattr(self, outcome) + 1)
+        return None
+
+    def _check_books(self) -> None:
+        if self.received != self.framed + self.skipped + self.pending:
+            raise AssertionError(f"framer lost count of its bytes: {self.counters()}")
+
+
+Fault = Literal["bad_crc", "bad_cobs", "oversize", "unknown_version"]
+
+
+def _unstuffed(run: bytes) -> Packet | Fault:
+    """The packet of a run without its closing 0x00."""
+    try:
+        return _parsed(cobs.decode(run))
+    except cobs.DecodeError:
+        return "bad_cobs"
+
+
+def _parsed(packet: bytes) -> Packet | Fault:
+    """The packet of bytes without COBS."""
+    end = len(packet) - f.LINK_CRC_BYTES
+    if len(packet) > f.LINK_MAX_BYTES:
+        return "oversize"
+    if end < f.LINK_HEADER_BYTES or zlib.crc32(packet[:end]) != CRC.unpack_from(packet, end)[0]:
+        return "bad_crc"
+    version, kind, channel, flags, sequence, time_ns = HEADER.unpack_from(packet)
+    if version != f.LINK_VERSION:
+        return "unknown_version"
+    return Packet(kind, channel, flags, sequence, time_ns, packet[f.LINK_HEADER_BYTES : end])
+
+
+def words429(packet: Packet) -> TimedWords:
+    """The words of an ARINC 429 packet with their device times; a body of a wrong length gives its whole entries.
+
+    Raises ValueError for another type of packet, MalformedBody for a device time beyond 292 years.
+    """
+    _require(packet, f.WORDS_429, "ARINC 429")
+    if packet.time_ns > TIME_LIMIT_NS:
+        raise MalformedBody(f"device time {packet.time_ns} ns does not fit a signed 64-bit count")
+    count, leftover = divmod(len(packet.body), ENTRY_429.itemsize)
+    entries = np.frombuffer(packet.body, ENTRY_429, count)
+    time_ns = entries["offset_ns"] + np.int64(packet.time_ns)
+    return TimedWords(time_ns, entries["word"], leftover, leftover == 0 and 1 <= count <= f.LINK_MAX_WORDS)
+
+
+def radar_word(packet: Packet) -> RadarWord:
+    """The word of an ARINC 708 packet. Raises ValueError for another type, MalformedBody if bits and bytes disagree."""
+    _require(packet, f.WORD_708, "ARINC 708")
+    bit_count, data = int.from_bytes(packet.body[:2], "little"), packet.body[2:]
+    if len(packet.body) < 2 or len(data) != (bit_count + 7) // 8:
+        raise MalformedBody(f"{len(data)} bytes do not hold a radar word of {bit_count} bits")
+    return RadarWord(bit_count, data)
+
+
+def hello(packet: Packet) -> Hello:
+    """What a bridge says of itself. Raises ValueError for another type, MalformedBody for a body cut short."""
+    _require(packet, f.HELLO, "hello")
+    body = _parse("HELLO", packet.body)
+    channels = tuple(HelloChannel(c.channel, c.kind, c.orientation, c.equipment_id) for c in body.channels)
+    return Hello(body.serial_number, body.firmware, channels)
+
+
+def heartbeat(packet: Packet) -> tuple[ChannelCount, ...]:
+    """The counts of each channel. Raises ValueError for another type, MalformedBody for a body cut short."""
+    _require(packet, f.HEARTBEAT, "heartbeat")
+    channels = _parse("HEARTBEAT", packet.body).channels
+    return tuple(ChannelCount(c.channel, c.received, c.lost) for c in channels)
+
+
+def time_mark(packet: Packet) -> int:
+    """Device time, ns, of the latest time-mark edge. Raises ValueError for another type, MalformedBody if not a u64."""
+    _require(packet, f.TIME_MARK, "time mark")
+    return int(_parse("TIME_MARK", packet.body).edge_time_ns)
+
+
+def _require(packet: Packet, kind: int, name: str) -> None:
+    if packet.type != kind:
+        raise ValueError(f"packet of type 0x{packet.type:02x} is no {name} packet (0x{kind:02x}): look at packet.type")
+
+
+def _parse(layout: str, body: bytes) -> Any:
+    # The layouts take construct with them, which only these rare packets need.
+    from construct import ConstructError  # noqa: PLC0415
+
+    from decoders import layouts  # noqa: PLC0415
+
+    try:
+        return getattr(layouts, layout).parse(body)
+    except ConstructError as error:
+        raise MalformedBody(f"{len(body)} bytes are no {layout} body") from error

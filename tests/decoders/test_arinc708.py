@@ -1,0 +1,214 @@
+"""Radials of ARINC 708 words: worked words, the declared layout, and one test for each fault of public decoders."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from decoders import formats, layouts
+from decoders.arinc708 import Radials, load_profile, unpack
+from tests.decoders.bus import header708
+
+PAYLOAD = bytes.fromhex("88c6fa") * 64
+HEADERS = st.binary(min_size=8, max_size=8)
+
+
+def words(*headers: bytes, payload: bytes = PAYLOAD) -> npt.NDArray[np.uint8]:
+    return np.frombuffer(b"".join(header + payload for header in headers), np.uint8).reshape(-1, 200)
+
+
+def radial(**fields: int) -> Radials:
+    return unpack(words(header708(**fields)))
+
+
+def scalars(radials: Radials) -> dict[str, float]:
+    return {name: getattr(radials, name)[0].item() for name in Radials._fields if name != "bins"}
+
+
+def test_a_word_of_a_weather_radar_decodes_as_worked_out() -> None:
+    radials = unpack(words(bytes.fromhex("b443047a0e80767c")))
+    assert scalars(radials) == {
+        "label": 0o055,
+        "control_accept": 3,
+        "slave": False,
+        "annunciations": 0b00010,
+        "faults": 0b0000001,
+        "stabilised": True,
+        "mode": 6,
+        "tilt_deg": -3.25,
+        "gain_db": 0.0,
+        "range_nm": 160.0,
+        "data_accept": 3,
+        "scan_angle_deg": 3982 * 360 / 4096 - 360,
+    }
+    assert round(radials.scan_angle_deg[0] + 360, 2) == 349.98
+    assert radials.bins.tolist() == [list(range(8)) * 64]
+
+
+def test_a_word_of_a_bench_generator_decodes_as_worked_out() -> None:
+    fields = scalars(unpack(words(bytes.fromhex("b4010001f817da03"))))
+    assert math.isnan(fields.pop("gain_db"))
+    assert fields == {
+        "label": 0o055,
+        "control_accept": 1,
+        "slave": False,
+        "annunciations": 0,
+        "faults": 0b1000000,
+        "stabilised": False,
+        "mode": 0,
+        "tilt_deg": -16.0,
+        "range_nm": 25.0,
+        "data_accept": 1,
+        "scan_angle_deg": 123 * 360 / 4096,
+    }
+
+
+@given(st.lists(HEADERS, min_size=1, max_size=8))
+def test_every_field_is_that_of_the_declared_layout(headers: list[bytes]) -> None:
+    radials = unpack(words(*headers))
+    for i, header in enumerate(headers):
+        declared = layouts.RADAR_HEADER.parse(header)
+        for name in (
+            "label",
+            "control_accept",
+            "slave",
+            "annunciations",
+            "faults",
+            "stabilised",
+            "mode",
+            "data_accept",
+        ):
+            assert getattr(radials, name)[i] == getattr(declared, name)
+        tilt, angle = declared.tilt, declared.scan_angle
+        assert radials.tilt_deg[i] == (tilt - 128 if tilt >= 64 else tilt) / 4
+        assert radials.scan_angle_deg[i] == (angle - 4096 if angle >= 2048 else angle) * 360 / 4096
+        assert radials.range_nm[i] == (5 * declared.range or 320)
+        assert math.isnan(radials.gain_db[i]) if declared.gain == 63 else radials.gain_db[i] == -declared.gain
+
+
+@pytest.mark.parametrize(("name", "place"), formats.HEADER_708.items())
+def test_each_field_at_its_ends_lies_where_the_layout_declares_it(name: str, place: tuple[int, int]) -> None:
+    first, width = place
+    zeros = dict.fromkeys([*formats.HEADER_708, "spare_48"], 0)
+    full = layouts.RADAR_HEADER.build(zeros | {name: 2**width - 1})
+    assert int.from_bytes(full, "little") == (2**width - 1) << first
+    top = layouts.RADAR_HEADER.build(zeros | {name: 2 ** (width - 1)})
+    assert int.from_bytes(top, "little") == 1 << (first if name == "label" else first + width - 1)
+
+
+@given(st.sampled_from(["arinc708", "arinc708a", "wxr2100_6bit"]), st.binary(min_size=192, max_size=192))
+def test_bin_k_is_its_own_bits_of_the_payload_least_significant_first(name: str, payload: bytes) -> None:
+    profile = load_profile(name)
+    bits = int.from_bytes(payload, "little")
+    size = profile.bits_per_bin
+    expected = [bits >> (k * size) & (2**size - 1) for k in range(profile.bins)]
+    assert unpack(words(bytes(8), payload=payload), name).bins.tolist() == [expected]
+
+
+def test_the_six_bit_profile_cuts_the_same_payload_into_256_bins() -> None:
+    assert unpack(words(bytes(8)), "wxr2100_6bit").bins.tolist() == [[0o10, 0o32, 0o54, 0o76] * 64]
+
+
+def test_a_negative_tilt_is_twos_complement() -> None:
+    assert radial(tilt=127).tilt_deg[0] == -0.25
+    assert radial(tilt=64).tilt_deg[0] == -16.0
+    assert radial(tilt=63).tilt_deg[0] == 15.75
+
+
+def test_spare_bit_48_does_not_leak_into_the_range() -> None:
+    assert radial(range=16, spare_48=1).range_nm[0] == radial(range=16).range_nm[0] == 80.0
+    assert radial(range=0, spare_48=1).range_nm[0] == 320.0
+
+
+@pytest.mark.parametrize("spare", [{"spare_11": 3}, {"spare_48": 1}, {"spare_63": 1}])
+def test_spare_bits_change_no_field(spare: dict[str, int]) -> None:
+    assert scalars(radial(**spare)) == scalars(radial())
+
+
+@pytest.mark.parametrize("field", ["range", "gain", "mode", "label"])
+def test_no_code_of_a_field_drops_the_radial(field: str) -> None:
+    codes = range(2 ** formats.HEADER_708[field][1])
+    radials = unpack(words(*(header708(**{field: code}) for code in codes)))
+    assert all(len(column) == len(codes) for column in radials)
+    np.testing.assert_array_equal(radials.bins, np.tile(np.arange(8), (len(codes), 64)))
+
+
+def test_a_payload_full_of_label_bytes_is_payload() -> None:
+    radials = unpack(words(header708(range=8), payload=b"\xb4" * 192))
+    assert (radials.label.tolist(), radials.range_nm.tolist()) == ([0o055], [40.0])
+    assert radials.bins[0, :8].tolist() == [0xB4B4B4 >> (3 * k) & 7 for k in range(8)]
+
+
+def test_a_word_with_another_label_is_kept() -> None:
+    radials = unpack(words(bytes.fromhex("f443047a0e80767c")))
+    assert (radials.label[0], radials.range_nm[0]) == (0o057, 160.0)
+
+
+@pytest.mark.parametrize(("code", "gain_db"), [(0, 0.0), (1, -1.0), (62, -62.0)])
+def test_gain_is_decibels_below_the_maximum(code: int, gain_db: float) -> None:
+    gain = radial(gain=code).gain_db[0]
+    assert (gain, np.signbit(gain)) == (gain_db, code > 0)
+
+
+def test_gain_code_63_is_calibrated_which_is_no_number() -> None:
+    assert math.isnan(radial(gain=63).gain_db[0])
+
+
+@pytest.mark.parametrize(
+    ("code", "angle"), [(0, 0.0), (1024, 90.0), (2047, 179.912109375), (2048, -180.0), (3072, -90.0)]
+)
+def test_the_scan_angle_is_clockwise_from_the_nose_and_never_180(code: int, angle: float) -> None:
+    assert radial(scan_angle=code).scan_angle_deg[0] == angle
+
+
+def test_a_profile_whose_scan_angle_starts_at_the_tail_is_turned_by_half_a_turn() -> None:
+    encoder = replace(load_profile("arinc708"), scan_angle_zero="tail")
+    turned = unpack(words(*(header708(scan_angle=code) for code in (0, 2048, 3072))), encoder)
+    assert turned.scan_angle_deg.tolist() == [-180.0, 0.0, 90.0]
+
+
+def test_the_first_bit_of_annunciations_and_faults_is_one() -> None:
+    word = np.zeros((2, 200), np.uint8)
+    word[0, 13 // 8] = 1 << 13 % 8
+    word[1, 18 // 8] = 1 << 18 % 8
+    radials = unpack(word)
+    assert radials.annunciations.tolist() == [1, 0]
+    assert radials.faults.tolist() == [0, 1]
+
+
+def test_arrays_have_their_declared_types_and_shapes() -> None:
+    radials = unpack(words(bytes(8), bytes(8)))
+    types = {name: (column.dtype.str[1:], column.shape) for name, column in radials._asdict().items()}
+    small = dict.fromkeys(["label", "control_accept", "annunciations", "faults", "mode", "data_accept"], ("u1", (2,)))
+    flags = dict.fromkeys(["slave", "stabilised"], ("b1", (2,)))
+    floats = dict.fromkeys(["tilt_deg", "gain_db", "range_nm", "scan_angle_deg"], ("f8", (2,)))
+    assert types == small | flags | floats | {"bins": ("u1", (2, 512))}
+
+
+@pytest.mark.parametrize("shape", [(200,), (1, 199), (3, 201), (2, 2, 200)])
+def test_words_of_another_length_are_refused_with_both_lengths(shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match=r"arinc708 takes \(n, 200\) bytes") as caught:
+        unpack(np.zeros(shape, np.uint8))
+    assert str(shape) in str(caught.value)
+
+
+def test_words_that_are_no_bytes_and_unknown_profiles_are_refused() -> None:
+    with pytest.raises(ValueError, match="uint8"):
+        unpack(np.zeros((1, 200)))
+    with pytest.raises(ValueError, match="wxr2100_6bit"):
+        unpack(np.zeros((1, 200), np.uint8), "arinc709")
+
+
+def test_strided_and_read_only_words_unpack_alike() -> None:
+    array = words(bytes.fromhex("b443047a0e80767c"), bytes(8))
+    for form in (array, array.copy(), np.asfortranarray(array), np.repeat(array, 2, axis=0)[::2]):
+        np.testing.assert_array_equal(unpack(form).bins, unpack(array.copy()).bins)
+        assert unpack(form).tilt_deg.tolist() == [-3.25, 0.0]
+
+
+def test_no_words_are_no_radials() -> None:
+    assert unpack(np.zeros((0, 200), np.uint8)).bins.shape == (0, 512)

@@ -1,0 +1,127 @@
+"""Label sets are checked when they are read, and a refusal names the file, the set and the label."""
+
+import sys
+from fractions import Fraction
+from pathlib import Path
+from subprocess import run
+
+import pytest
+
+from decoders.definitions import DefinitionError, for_equipment, load_definitions
+
+BASE = "name = 'n', source = 's', confidence = 'c'"
+ANGLE = "encoding = 'bnr', bits = [14, 28], range = 180, lsb = '180/2^15', units = 'deg'"
+
+
+def file_of(folder: Path, *rows: str, head: str = "equipment_id = 1") -> Path:
+    file = folder / "mine.toml"
+    file.write_text(f"[mine]\n{head}\nrows = [{', '.join(f'{{ {BASE}, {row} }}' for row in rows)}]", "utf-8")
+    return file
+
+
+def test_a_file_of_the_users_is_a_set(tmp_path: Path) -> None:
+    definitions = load_definitions(
+        file_of(tmp_path, f"label = '314', {ANGLE}, fields = {{ low = 11, pair = [12, 13] }}")
+    )
+    row = definitions.labels[0o314]
+    assert (definitions.name, definitions.equipment_id) == ("mine", 1)
+    assert (row.lsb, row.range, row.ssm, row.has_sdi) == (Fraction(180, 2**15), Fraction(180), "bnr", True)
+    assert row.fields == {"low": (11, 11), "pair": (12, 13)}
+
+
+@pytest.mark.parametrize(
+    ("row", "reason"),
+    [
+        (f"label = '314', {ANGLE}, fields = {{ a = [11, 14] }}", "bit 14 of a overlaps the value"),
+        (f"label = '314', {ANGLE}, fields = {{ a = 29 }}", "bit 29 of a overlaps the sign"),
+        (f"label = '314', {ANGLE}, fields = {{ a = [11, 12], b = 12 }}", "bit 12 of b overlaps a"),
+        ("label = '314', encoding = 'disc', fields = { a = [11, 12], b = 12 }", "bit 12 of b overlaps a"),
+        (f"label = '314', {ANGLE.replace('2^15', '2^14')}", r"the LSB is not range / 2\^15"),
+        (f"label = '314', {ANGLE}, colour = 'red'", "colour"),
+        ("label = '314', encoding = 'bnr', bits = [14, 28], range = 180, units = 'deg'", "needs lsb"),
+        ("label = '314', encoding = 'bnr2'", "unknown encoding 'bnr2'"),
+        ("label = '314', encoding = 'time', bits = [12, 28]", "bits"),
+        (f"label = '314', {ANGLE}, ssm = 'odd'", "unknown ssm 'odd'"),
+        (f"label = '314', {ANGLE}, fields = 7", "has no attribute"),
+        (f"label = '400', {ANGLE}", "octal 000 to 377"),
+        (f"label = '389', {ANGLE}", "base 8"),
+        (f"label = 314, {ANGLE}", "label 314"),
+        (f"label = '314', {ANGLE.replace('28', '27').replace('^15', '^14')}", "bits end at 28"),
+        ("label = '314', encoding = 'disc', bits = [8, 12]", "bits 8 to 12"),
+        ("label = '314', encoding = 'disc', bits = [12, 30]", "bits 12 to 30"),
+        ("label = '314', encoding = 'disc', bits = [13, 12]", "bits 13 to 12"),
+        ("label = '314', encoding = 'bcd', bits = [11, 29], lsb = 0, units = ''", "not positive"),
+        ("label = '314', encoding = 'bcd', bits = [11, 29], lsb = '1/2^54', units = ''", "too fine"),
+    ],
+)
+def test_a_row_that_contradicts_itself_is_refused(row: str, reason: str, tmp_path: Path) -> None:
+    with pytest.raises(DefinitionError, match=reason) as caught:
+        load_definitions(file_of(tmp_path, row))
+    assert str(caught.value).startswith("mine.toml [mine] label ")
+
+
+def test_a_label_twice_in_one_set_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DefinitionError, match=r"mine.toml \[mine\] label 014: defined twice"):
+        load_definitions(file_of(tmp_path, f"label = '14', {ANGLE}", f"label = '014', {ANGLE}"))
+
+
+def test_a_set_that_extends_another_replaces_labels_and_keeps_the_rest(tmp_path: Path) -> None:
+    head = "equipment_id = 4\nextends = 'iru_704'"
+    wide = ANGLE.replace("14, 28", "11, 28").replace("^15", "^18")
+    mine = load_definitions(file_of(tmp_path, f"label = '314', {wide}", head=head))
+    assert mine.labels[0o314].bits == (11, 28)
+    assert mine.labels[0o310] == load_definitions("iru_704").labels[0o310]
+    assert load_definitions("iru_704").labels[0o314].bits == (14, 28)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("[a]\nequipment_id = 1\nrows = []\n[b]\nequipment_id = 1\nrows = []", "2 sets"),
+        ("", "0 sets"),
+        ("[a]\nrows = []", "a set has equipment_id"),
+        ("[a]\nequipment_id = 1\nrows = []\nrowz = []", "a set has equipment_id"),
+        ("[a]\nequipment_id = 1\nrows = [7]", "7 is no row"),
+        ("a = ", "is no TOML"),
+    ],
+)
+def test_a_file_that_is_not_one_set_is_refused(text: str, reason: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(text, "utf-8")
+    with pytest.raises(DefinitionError, match=reason) as caught:
+        load_definitions(file)
+    assert "mine.toml" in str(caught.value)
+
+
+def test_an_unknown_name_is_refused_with_the_names_there_are() -> None:
+    with pytest.raises(ValueError, match=r"'iru_705'.*iru_704"):
+        load_definitions("iru_705")
+    with pytest.raises(FileNotFoundError):
+        load_definitions("/nowhere/labels.toml")
+
+
+@pytest.mark.parametrize(
+    ("equipment_id", "name"),
+    [(0x0B, "gnss_743a"), (0x04, "iru_704"), (0x06, "adc_706"), (0x07, "ra_707"), (0x99, None)],
+)
+def test_equipment_is_looked_up_by_the_low_byte_of_its_id(equipment_id: int, name: str | None) -> None:
+    assert for_equipment(equipment_id) == name
+    assert name is None or load_definitions(name).equipment_id == equipment_id
+
+
+@pytest.mark.parametrize(
+    ("name", "twenty_bit"),
+    [
+        ("gnss_743", {0o061, 0o063, 0o064, 0o065, 0o070, 0o072, 0o074, 0o076, 0o110, 0o111, 0o140, 0o370}),
+        ("adiru_738", {0o254, 0o255, 0o261, 0o265, 0o310, 0o311, 0o361}),
+        ("adc_706", set()),
+    ],
+)
+def test_bits_9_and_10_are_data_in_the_20_bit_words_and_in_no_other(name: str, twenty_bit: set[int]) -> None:
+    labels = load_definitions(name).labels
+    assert {label for label, row in labels.items() if not row.has_sdi} == twenty_bit
+
+
+def test_the_label_table_is_read_without_numba() -> None:
+    code = "import decoders.definitions as d, sys; d.load_definitions('iru_704'); sys.exit('numba' in sys.modules)"
+    assert run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,271 @@
+"""The framer keeps its books on any bytes, and each body is read or refused."""
+
+import struct
+import sys
+import zlib
+from itertools import pairwise
+from subprocess import run
+
+import pytest
+from cobs import cobs
+from hypothesis import given
+from hypothesis import strategies as st
+
+from decoders import layouts
+from decoders.racklink import (
+    ChannelCount,
+    Framer,
+    Hello,
+    HelloChannel,
+    MalformedBody,
+    Packet,
+    heartbeat,
+    hello,
+    radar_word,
+    time_mark,
+    words429,
+)
+from tests.decoders.bus import frame
+
+LARGEST_RUN = 4096 + 17  # COBS adds a byte to each begun group of 254
+BODIES = st.binary(max_size=600)
+GARBAGE = st.lists(st.sampled_from([b"\0", b"\1", b"\xff" * 300, b"abc\0", b"\5ab\0", b"x" * 3000]), max_size=6)
+
+
+def packet_bytes(body: bytes = b"", kind: int = 0x10, sequence: int = 0, version: int = 1) -> bytes:
+    head = layouts.PACKET_HEADER.build(
+        {"type": kind, "channel": 7, "flags": 0x12, "sequence": sequence, "time_ns": 2**40 + 5}
+    )
+    packet = bytes([version]) + head[1:] + body
+    return packet + zlib.crc32(packet).to_bytes(4, "little")
+
+
+def made(kind: int, body: bytes, time_ns: int = 1000) -> Packet:
+    return Packet(kind, 1, 0, 0, time_ns, body)
+
+
+GOOD = Packet(0x10, 7, 0x12, 3, 2**40 + 5, b"body")
+GOOD_FRAME = frame(packet_bytes(b"body", sequence=3))
+
+
+def fed(pieces: list[bytes]) -> tuple[list[Packet], dict[str, int]]:
+    framer = Framer()
+    packets = [packet for piece in pieces for packet in framer.feed(piece)]
+    return packets, framer.counters()
+
+
+def test_a_packet_comes_out_with_its_header_and_body() -> None:
+    packets, counters = fed([GOOD_FRAME])
+    assert packets == [GOOD]
+    assert counters == dict.fromkeys(counters, 0) | {"received": len(GOOD_FRAME), "framed": len(GOOD_FRAME)}
+
+
+def test_a_packet_written_out_byte_by_byte_decodes() -> None:
+    # A time mark of channel 7 after a FIFO overflow; its one zero byte is the COBS code 05.
+    stream = bytes.fromhex("18 0103070104030201 0807060504030201 11223344556677 05 9d220752 00")
+    packets, _ = fed([stream])
+    assert packets == [Packet(3, 7, 1, 0x01020304, 0x0102030405060708, bytes.fromhex("1122334455667700"))]
+
+
+@given(st.lists(BODIES, max_size=5), GARBAGE, st.data())
+def test_any_cut_of_the_stream_gives_the_same_packets_and_counters(
+    bodies: list[bytes], garbage: list[bytes], data: st.DataObject
+) -> None:
+    stream = b"".join([frame(packet_bytes(body)) for body in bodies] + garbage + [GOOD_FRAME] + garbage)
+    cuts = [0, *sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=12))), len(stream)]
+    assert fed([stream[a:b] for a, b in pairwise(cuts)]) == fed([stream])
+
+
+@given(st.lists(BODIES, max_size=2), GARBAGE)
+def test_one_byte_at_a_time_gives_the_same_packets_and_counters(bodies: list[bytes], garbage: list[bytes]) -> None:
+    stream = b"".join([frame(packet_bytes(body)) for body in bodies] + garbage + [GOOD_FRAME])
+    assert fed([bytes([byte]) for byte in stream]) == fed([stream])
+
+
+@given(st.one_of(st.binary(max_size=9000), GARBAGE.map(b"".join)))
+def test_after_any_garbage_the_next_good_packet_decodes(garbage: bytes) -> None:
+    packets, _ = fed([garbage, GOOD_FRAME])
+    assert packets[-1] == GOOD
+
+
+@pytest.mark.parametrize("length", range(1, len(GOOD_FRAME)))
+def test_a_packet_cut_short_does_not_take_its_neighbour_with_it(length: int) -> None:
+    packets, counters = fed([GOOD_FRAME[:length], GOOD_FRAME])
+    assert packets == [GOOD]
+    assert (counters["skipped"], counters["framed"]) == (length, len(GOOD_FRAME))
+    assert counters["bad_crc"] + counters["bad_cobs"] == 1
+
+
+@given(st.lists(st.one_of(st.binary(max_size=9000), GARBAGE.map(b"".join)), max_size=4))
+def test_every_byte_is_framed_skipped_or_pending_and_pending_is_bounded(pieces: list[bytes]) -> None:
+    framer = Framer()
+    for piece in pieces:
+        framer.feed(piece)
+        assert framer.received == framer.framed + framer.skipped + framer.pending
+        assert framer.pending <= LARGEST_RUN
+    assert framer.received == sum(map(len, pieces))
+
+
+@pytest.mark.parametrize("place", range(len(GOOD_FRAME) - 1))
+def test_a_damaged_packet_costs_itself_alone_and_one_count(place: int) -> None:
+    damaged = bytearray(GOOD_FRAME)
+    damaged[place] ^= 0xFF if damaged[place] != 0xFF else 0x01
+    packets, counters = fed([bytes(damaged) + GOOD_FRAME])
+    assert packets == [GOOD]
+    assert counters["skipped"] == counters["framed"] == len(GOOD_FRAME)
+    assert counters["bad_crc"] + counters["bad_cobs"] == 1
+
+
+def test_a_bad_crc_is_counted() -> None:
+    _, counters = fed([frame(packet_bytes(b"body")[:-1] + b"\0")])
+    assert (counters["bad_crc"], counters["framed"]) == (1, 0)
+
+
+def test_a_packet_too_short_for_header_and_crc_is_counted_as_a_bad_crc() -> None:
+    short = bytes(15)
+    for packet in (b"", b"\1", short + zlib.crc32(short).to_bytes(4, "little")):
+        assert fed([frame(packet)])[1]["bad_crc"] == 1
+
+
+def test_a_cobs_code_that_points_past_the_end_is_counted() -> None:
+    packets, counters = fed([b"\x09abc\0" + GOOD_FRAME])
+    assert (packets, counters["bad_cobs"], counters["skipped"]) == ([GOOD], 1, 5)
+
+
+def test_the_largest_packet_passes_and_one_byte_more_is_oversize() -> None:
+    for fill in (b"\0", b"\7"):
+        packets, counters = fed([frame(packet_bytes(fill * 4076))])
+        assert (len(packets), counters["oversize"]) == (1, 0)
+        packets, counters = fed([frame(packet_bytes(fill * 4077)) + GOOD_FRAME])
+        assert (packets, counters["oversize"]) == ([GOOD], 1)
+
+
+def test_the_largest_packet_is_the_longest_run_that_is_kept() -> None:
+    assert len(cobs.encode(packet_bytes(b"\7" * 4076))) == LARGEST_RUN
+    framer = Framer()
+    framer.feed(b"\7" * LARGEST_RUN)
+    assert (framer.pending, framer.oversize) == (LARGEST_RUN, 0)
+    framer.feed(b"\7")
+    assert (framer.pending, framer.oversize, framer.skipped) == (LARGEST_RUN, 1, 1)
+
+
+def test_an_overlong_run_is_one_count_and_costs_no_good_packet() -> None:
+    packets, counters = fed([b"\7" * 5000, b"\7" * 5000, GOOD_FRAME, GOOD_FRAME])
+    assert (packets, counters["oversize"]) == ([GOOD, GOOD], 1)
+    assert counters["skipped"] == 10_000
+
+
+def test_another_version_is_intact_and_counted_but_no_packet() -> None:
+    data = frame(packet_bytes(b"new", version=2))
+    packets, counters = fed([data])
+    assert (packets, counters["unknown_version"], counters["framed"]) == ([], 1, len(data))
+
+
+def test_an_unknown_type_is_a_packet() -> None:
+    assert fed([frame(packet_bytes(b"?", kind=0xEE))])[0][0].type == 0xEE
+
+
+def test_zeros_between_packets_are_skipped_and_nothing_else() -> None:
+    packets, counters = fed([b"\0\0" + GOOD_FRAME + b"\0"])
+    assert packets == [GOOD]
+    assert counters["skipped"] == 3
+    assert not any(counters[name] for name in ("bad_crc", "bad_cobs", "oversize", "unknown_version"))
+
+
+@given(st.binary(max_size=5000))
+def test_a_datagram_is_one_packet_without_cobs_or_a_counted_loss(data: bytes) -> None:
+    framer = Framer()
+    assert framer.feed_datagram(packet_bytes(b"body", sequence=3)) == [GOOD]
+    assert framer.feed_datagram(data) == []
+    assert (framer.skipped, framer.pending, framer.bad_crc + framer.oversize) == (len(data), 0, 1)
+
+
+def test_words_come_with_their_device_times() -> None:
+    body = struct.pack("<4I", 0, 0x11223344, 2**32 - 1, 0xFFFFFFFF)
+    timed = words429(made(0x10, body, 2**40))
+    assert timed.time_ns.tolist() == [2**40, 2**40 + 2**32 - 1]
+    assert timed.words.tolist() == [0x11223344, 0xFFFFFFFF]
+    assert (timed.time_ns.dtype.str[1:], timed.words.dtype.str[1:]) == ("i8", "u4")
+    assert (timed.leftover_bytes, timed.well_formed) == (0, True)
+
+
+@given(st.lists(st.tuples(st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1)), min_size=1, max_size=256))
+def test_words_are_those_of_the_declared_layout(entries: list[tuple[int, int]]) -> None:
+    body = layouts.WORDS_429.build({"words": [{"offset_ns": offset, "word": word} for offset, word in entries]})
+    timed = words429(made(0x10, body, 0))
+    assert list(zip(timed.time_ns.tolist(), timed.words.tolist(), strict=True)) == entries
+
+
+@pytest.mark.parametrize(("size", "words", "leftover"), [(0, 0, 0), (7, 0, 7), (13, 1, 5), (257 * 8, 257, 0)])
+def test_a_words_body_of_a_wrong_length_keeps_its_whole_words_and_says_so(size: int, words: int, leftover: int) -> None:
+    timed = words429(made(0x10, bytes(size)))
+    assert (timed.words.size, timed.leftover_bytes, timed.well_formed) == (words, leftover, False)
+
+
+def test_a_device_time_that_would_overflow_is_malformed() -> None:
+    latest = words429(made(0x10, b"\xff" * 8, 2**63 - 2**32))
+    assert latest.time_ns.tolist() == [2**63 - 1]
+    with pytest.raises(MalformedBody, match="64-bit"):
+        words429(made(0x10, bytes(8), 2**63 - 2**32 + 1))
+
+
+@given(st.integers(0, 2047), st.data())
+def test_a_radar_word_of_any_length_is_that_of_the_declared_layout(bits: int, data: st.DataObject) -> None:
+    size = (bits + 7) // 8
+    payload = data.draw(st.binary(min_size=size, max_size=size))
+    body = layouts.WORD_708.build({"bit_count": bits, "data": payload})
+    assert radar_word(made(0x20, body)) == (bits, payload)
+
+
+@pytest.mark.parametrize("body", [b"", b"\1", b"\1\0", b"\x40\6" + bytes(199), b"\x40\6" + bytes(201)])
+def test_a_radar_word_whose_bits_and_bytes_disagree_is_malformed(body: bytes) -> None:
+    with pytest.raises(MalformedBody, match="do not hold"):
+        radar_word(made(0x20, body))
+
+
+def test_a_hello_names_the_bridge_and_its_channels() -> None:
+    body = bytes.fromhex("0d0c0b0a 0201 00290004 05700100")
+    assert hello(made(0x01, body)) == Hello(
+        0x0A0B0C0D, 0x0102, (HelloChannel(0, 0x29, 0, 4), HelloChannel(5, 0x70, 1, 0))
+    )
+
+
+def test_a_heartbeat_counts_words_by_channel() -> None:
+    body = bytes.fromhex("03 01000000 02000000 ff ffffffff 00000080")
+    assert heartbeat(made(0x02, body)) == (ChannelCount(3, 1, 2), ChannelCount(255, 2**32 - 1, 2**31))
+
+
+def test_a_time_mark_is_the_device_time_of_its_edge() -> None:
+    assert time_mark(made(0x03, bytes.fromhex("0807060504030201"))) == 0x0102030405060708
+
+
+@pytest.mark.parametrize(
+    ("read", "kind", "body"),
+    [(hello, 1, bytes(5)), (hello, 1, bytes(9)), (heartbeat, 2, bytes(10)), (time_mark, 3, bytes(7))],
+)
+def test_a_body_cut_short_or_drawn_out_is_malformed(read: object, kind: int, body: bytes) -> None:
+    assert callable(read)
+    with pytest.raises(MalformedBody, match="are no"):
+        read(made(kind, body))
+
+
+@given(st.binary(max_size=64))
+def test_any_body_is_read_or_malformed(body: bytes) -> None:
+    for kind, read in {1: hello, 2: heartbeat, 3: time_mark, 0x10: words429, 0x20: radar_word}.items():
+        try:
+            read(made(kind, body))
+        except MalformedBody as error:
+            assert str(error)
+
+
+@pytest.mark.parametrize("read", [hello, heartbeat, time_mark, words429, radar_word])
+def test_a_body_reader_refuses_a_packet_of_another_type(read: object) -> None:
+    assert callable(read)
+    with pytest.raises(ValueError, match="type 0x55") as caught:
+        read(made(0x55, bytes(8)))
+    assert not isinstance(caught.value, MalformedBody)
+
+
+def test_importing_the_framer_does_not_import_construct_or_numba() -> None:
+    code = "import decoders.racklink, sys; sys.exit(bool({'construct', 'numba'} & sys.modules.keys()))"
+    assert run([sys.executable, "-c", code], check=False).returncode == 0
