@@ -1,0 +1,131 @@
+"""No byte is lost, nothing is early, and everything ends when told to."""
+
+import itertools
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from simulators.outlets import Closed, FileOutlet, Outlet, PtyOutlet, TcpOutlet
+from simulators.player import play
+
+DATA = bytes(range(256)) * 1200  # every byte value, and far more than the kernel holds
+
+
+def collect(read: Callable[[], bytes], size: int, into: bytearray, pause_s: float = 0.0) -> threading.Thread:
+    def run() -> None:
+        while len(into) < size and (chunk := read()):
+            into.extend(chunk)
+            time.sleep(pause_s)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread
+
+
+def test_a_pseudo_terminal_delivers_every_byte_to_a_slow_reader() -> None:
+    received = bytearray()
+    with PtyOutlet() as outlet:
+        reader = os.open(outlet.path, os.O_RDONLY | os.O_NOCTTY)
+        thread = collect(lambda: os.read(reader, 3000), len(DATA), received, pause_s=0.001)
+        for start in range(0, len(DATA), 10_000):
+            outlet.write(DATA[start : start + 10_000])
+    thread.join(10)
+    os.close(reader)
+    assert received == DATA
+
+
+def test_closing_a_pseudo_terminal_waits_for_its_reader() -> None:
+    received = bytearray()
+    outlet = PtyOutlet()
+    reader = os.open(outlet.path, os.O_RDONLY | os.O_NOCTTY)
+    outlet.write(DATA[:4000])
+    threading.Timer(0.2, lambda: received.extend(os.read(reader, 4000))).start()
+    outlet.close()
+    outlet.close()
+    os.close(reader)
+    assert received == DATA[:4000]
+
+
+def test_a_writer_that_waits_for_nobody_is_released_by_close(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("simulators.outlets.DRAIN_S", 0.1)
+    outlet = PtyOutlet()
+    threading.Timer(0.3, outlet.close).start()
+    with pytest.raises(Closed):
+        outlet.write(DATA)
+
+
+def test_a_tcp_client_gets_every_byte_and_then_the_end() -> None:
+    received = bytearray()
+    with TcpOutlet() as outlet:
+        client = socket.create_connection(outlet.address)
+        thread = collect(lambda: client.recv(5000), 10**9, received)
+        outlet.write(DATA)
+    thread.join(10)
+    client.close()
+    assert received == DATA
+
+
+def test_a_tcp_client_that_leaves_ends_the_playing() -> None:
+    with TcpOutlet() as outlet:
+        socket.create_connection(outlet.address).close()
+        played = play(((k, DATA[:1000]) for k in itertools.count()), outlet)
+    assert played.packets < 10_000
+
+
+def test_a_tcp_outlet_without_a_client_is_released_by_close() -> None:
+    outlet = TcpOutlet()
+    threading.Timer(0.2, outlet.close).start()
+    with pytest.raises(Closed):
+        outlet.write(b"x")
+
+
+def test_a_file_holds_the_stream(tmp_path: Path) -> None:
+    with FileOutlet(tmp_path / "bus.bin") as outlet:
+        played = play([(0, b"ab"), (10**12, b"c")], outlet, speed=float("inf"))
+    assert (tmp_path / "bus.bin").read_bytes() == b"abc"
+    assert (played.packets, played.size_bytes) == (2, 3)
+
+
+class Clocked(Outlet):
+    """Notes when each packet arrives."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+
+    def write(self, data: bytes) -> None:
+        self.times.append(time.monotonic())
+
+    def close(self) -> None: ...
+
+
+@pytest.mark.parametrize("speed", [1.0, 4.0])
+def test_packets_are_played_at_their_device_times_and_never_early(speed: float) -> None:
+    due_ns = [7_000_000_000 + 20_000_000 * k for k in range(20)]
+    clocked = Clocked()
+    played = play(((time_ns, b"x") for time_ns in due_ns), clocked, speed)
+    lateness = [
+        (arrived - clocked.times[0]) - (due - due_ns[0]) / 1e9 / speed
+        for arrived, due in zip(clocked.times, due_ns, strict=True)
+    ]
+    assert min(lateness) > -0.001
+    assert played.worst_lateness_s >= max(lateness) - 0.001
+    assert played.worst_lateness_s < 0.5
+
+
+def test_stop_ends_the_playing_at_once() -> None:
+    stop = threading.Event()
+    threading.Timer(0.1, stop.set).start()
+    began = time.monotonic()
+    played = play(((k * 10**9, b"x") for k in range(100)), Clocked(), stop=stop)
+    assert time.monotonic() - began < 1.0
+    assert played.packets == 1
+
+
+def test_a_speed_of_nought_is_refused() -> None:
+    with pytest.raises(ValueError, match="speed"):
+        play([], Clocked(), speed=0.0)
