@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test lint bench setup lock calibration integrity clean
+.PHONY: demo test lint bench integrity latency calibration setup lock clean
 
 demo: $(READY)
 	$(BIN)/shadebus demo
@@ -18,6 +18,18 @@ lint: $(READY)
 
 bench: $(READY)
 	$(BIN)/pytest benchmarks --benchmark-enable --benchmark-only
+
+# Rates of false and true alerts on flights that nothing was tuned on; a few minutes on two cores.
+integrity: $(READY)
+	$(BIN)/python -m benchmarks.integrity
+
+# Time from a full scan on the line to its verdict, at real bus rates.
+latency: $(READY)
+	$(BIN)/python -m benchmarks.latency
+
+# The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
+calibration: $(READY)
+	$(BIN)/python -m benchmarks.calibrate_demo
 
 setup: $(READY)
 

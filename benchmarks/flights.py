@@ -1,8 +1,9 @@
 """Simulated flights through the decoders and the monitor, byte for byte, as fast as they compute."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ from monitor.integrity import Comparison, Verdict
 from monitor.scans import Scan
 from simulators.scenario import Scenario
 from simulators.traffic import traffic
+
+BATCH = 64
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,9 @@ def fly(flight: Flight) -> list[Judged]:
     return judged
 
 
-def fly_all(flights: list[Flight]) -> Iterator[list[Judged]]:
-    """The judged scans of many flights, in order, on all cores."""
+def fly_all(flights: Iterable[Flight]) -> Iterator[list[Judged]]:
+    """The judged scans of many flights, in order, on all cores; flights are drawn as they are needed."""
+    flights = iter(flights)
     with ProcessPoolExecutor() as pool:
-        yield from pool.map(fly, flights, chunksize=4)
+        while batch := list(islice(flights, BATCH)):
+            yield from pool.map(fly, batch)

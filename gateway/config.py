@@ -53,18 +53,31 @@ class RackConfig(_Section):
 
 
 def load_config(path: Path) -> RackConfig:
-    """Read and check a rack file. Raises GatewayError naming the file, the key and what it should be."""
+    """Read and check a rack file; relative paths in it count from where it lies.
+
+    Raises GatewayError naming the file, the key and what it should be.
+    """
     try:
         table = tomllib.loads(path.read_text())
     except OSError as error:
         raise GatewayError(f"cannot read configuration {path}: {error.strerror}") from error
     except tomllib.TOMLDecodeError as error:
         raise GatewayError(f"configuration {path} is not TOML: {error}") from error
-    return check_config(table, str(path))
+    config = check_config(table, str(path))
+    base = path.absolute().parent
+    recording = config.recording and config.recording.model_copy(
+        update={"directory": base / config.recording.directory}
+    )
+    changes = {
+        "terrain": tuple(base / file for file in config.terrain),
+        "calibration": config.calibration and base / config.calibration,
+        "recording": recording,
+    }
+    return config.model_copy(update=changes)
 
 
 def check_config(table: dict[str, object], origin: str) -> RackConfig:
-    """A rack configuration from its table; paths in it are taken as they stand, relative to the working directory."""
+    """A rack configuration from its table, with paths as they stand. Raises GatewayError naming origin and key."""
     try:
         return RackConfig.model_validate(table)
     except ValidationError as error:

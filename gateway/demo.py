@@ -33,7 +33,7 @@ from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Verdict
 from monitor.scans import Scan
 
 SHIFT_EAST_M = 500.0
-LEG_S = 54.0  # twelve sweeps
+LEG_S = 12 * 361 / 80  # twelve whole sweeps of 361 radials at 80 a second
 GNSS_FAILS_S = 18.0
 P_FA = 1e-4
 COLOURS = {OK: "green", ALERT: "red", UNAVAILABLE: "yellow"}

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from monitor.integrity import Comparison, Verdict
@@ -17,6 +18,7 @@ from monitor.scans import Scan
 
 LIT, SHADOW, UNSEEN = "#2f8f4e", "#101418", "#c9d1d9"
 VERDICT_COLOURS = {"ok": "#2f8f4e", "alert": "#c62828", "unavailable": "#b38600"}
+LEGEND = [Line2D([], [], ls="", marker="o", color=colour, label=name) for name, colour in VERDICT_COLOURS.items()]
 LEVELS = ListedColormap(["#101418", "#2f8f4e", "#d7c32d", "#c62828", "#b63bb6"])
 STATES = ListedColormap([UNSEEN, SHADOW, LIT])
 
@@ -37,7 +39,10 @@ def write_report(directory: Path, legs: Mapping[str, Sequence[Picture]]) -> Path
     parts = ["<!doctype html><meta charset=utf-8><title>shadebus report</title>", STYLE, "<h1>shadebus report</h1>"]
     _save(_timeline(legs), directory / "statistic.png")
     _save(_histogram(legs), directory / "disparities.png")
-    parts.append("<h2>The statistic against its threshold</h2><img src=statistic.png>")
+    parts.append("<h2>The test statistic against its threshold</h2><img src=statistic.png>")
+    parts.append(
+        "<p>Each dot is a scan; above the dashed line it alerts. A vertical line is a scan without a verdict.</p>"
+    )
     parts.append("<h2>Disparities</h2><img src=disparities.png>")
     for number, (title, pictures) in enumerate(legs.items()):
         shown = next((p for p in reversed(pictures) if p.comparison is not None), None)
@@ -47,6 +52,9 @@ def write_report(directory: Path, legs: Mapping[str, Sequence[Picture]]) -> Path
         _save(_ppi(shown.scan, shown.comparison), directory / name)
         caption = f"{title}: scan {shown.verdict.scan}, {shown.verdict.verdict}"
         parts.append(f"<h2>{html.escape(caption)}</h2><img src={name}>")
+        parts.append(
+            "<p>Left: what the radar sent. Then lit bins green, shadows black, and grey before the first lit bin.</p>"
+        )
     parts.append(_table(legs))
     page = directory / "index.html"
     page.write_text("\n".join(parts), encoding="utf-8")
@@ -64,7 +72,7 @@ def _save(figure: Figure, path: Path) -> None:
 
 
 def _ppi(scan: Scan, comparison: Comparison) -> Figure:
-    figure = Figure(figsize=(13, 4.6))
+    figure = Figure(figsize=(13, 3.4))
     panels = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
     width_nm = scan.range_nm / scan.bins.shape[1]
     _polar(panels[0], scan.scan_angle_deg, scan.bins, width_nm, LEVELS, (0, 1, 2, 3, 4, 64))
@@ -107,8 +115,9 @@ def _timeline(legs: Mapping[str, Sequence[Picture]]) -> Figure:
             else:
                 panel.plot(time_s, v.q / v.threshold, "o", color=colour)
         panel.axhline(1, color="k", lw=1, ls="--")
-        panel.set(title=title, xlabel="time (s)", yscale="log")
-    axes[0].set_ylabel("Q over its threshold")
+        panel.set(title=title, xlabel="time (s)", ylim=(0, None))
+    axes[0].set_ylabel("statistic over its threshold")
+    axes[0].legend(handles=LEGEND, loc="upper left", fontsize="small")
     return figure
 
 

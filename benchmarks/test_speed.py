@@ -1,0 +1,125 @@
+"""Speed as ratios: each group holds the work and a rival that does the least any program could; read the (x.x)."""
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cobs import cobs
+from numba import njit
+from numpy.typing import NDArray
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from decoders import arinc708
+from decoders.arinc429 import decode, load_definitions
+from decoders.racklink import Framer
+from monitor.geodesy import NM_M
+from monitor.prediction import Beam, Pointing, predict
+from monitor.shade import radar_states
+from monitor.terrain import Grid, open_terrain, sample
+from simulators import racklink
+from simulators.scenario import BUILT_IN_TERRAIN
+
+RADIALS, BINS, RANGE_NM = 361, 512, 10.0
+RNG = np.random.default_rng(1)
+PACKETS = 2000
+
+
+@pytest.fixture(scope="module")
+def stream() -> bytes:
+    """Radar words and blocks of ten ARINC 429 words in turn, as a bridge sends them."""
+    packets = []
+    for k in range(PACKETS):
+        body = RNG.bytes(200)
+        if k % 2:
+            packets.append(racklink.encode(0x20, 0, k, k * 1000, struct.pack("<H", 1600) + body))
+        else:
+            packets.append(racklink.encode(0x10, 1, k, k * 1000, body[:80]))
+    return b"".join(packets)
+
+
+@pytest.mark.benchmark(group="framing, 2000 packets")
+def test_framer(benchmark: BenchmarkFixture, stream: bytes) -> None:
+    assert len(benchmark(lambda: Framer().feed(stream))) == PACKETS
+
+
+@pytest.mark.benchmark(group="framing, 2000 packets")
+def test_bare_loop_over_cobs_and_crc(benchmark: BenchmarkFixture, stream: bytes) -> None:
+    def loop() -> int:
+        good = 0
+        for run in stream.split(b"\0")[:-1]:
+            packet = cobs.decode(run)
+            good += zlib.crc32(packet[:-4]) == int.from_bytes(packet[-4:], "little")
+        return good
+
+    assert benchmark(loop) == PACKETS
+
+
+@pytest.mark.benchmark(group="708 words to bins, 10000 words")
+def test_708_unpack(benchmark: BenchmarkFixture) -> None:
+    words = RNG.integers(0, 256, (10_000, 200), np.uint8)
+    assert benchmark(lambda: arinc708.unpack(words)).bins.shape == (10_000, BINS)
+
+
+@pytest.mark.benchmark(group="708 words to bins, 10000 words")
+def test_copy_of_the_708_output(benchmark: BenchmarkFixture) -> None:
+    bins = RNG.integers(0, 8, (10_000, BINS), np.uint8)
+    assert benchmark(bins.copy).shape == bins.shape
+
+
+@pytest.mark.benchmark(group="429 words to values, 100000 words")
+def test_429_decode(benchmark: BenchmarkFixture) -> None:
+    words = RNG.integers(0, 2**32, 100_000, np.uint32)
+    definitions = load_definitions("iru_704")
+    assert len(benchmark(lambda: decode(words, definitions)).value) == len(words)
+
+
+@pytest.mark.benchmark(group="429 words to values, 100000 words")
+def test_copy_of_the_429_output(benchmark: BenchmarkFixture) -> None:
+    values = RNG.random(100_000)
+    assert len(benchmark(values.copy)) == len(values)
+
+
+@pytest.fixture(scope="module")
+def pointing() -> Pointing:
+    ones = np.ones(RADIALS)
+    azimuth = np.radians(197.6 + np.linspace(-90, 90, RADIALS))
+    return Pointing(44.37514 * ones, -71.71874 * ones, 761.0 * ones, azimuth, np.radians(-2.0) * ones)
+
+
+@pytest.fixture(scope="module")
+def grid() -> Grid:
+    return open_terrain(Path(BUILT_IN_TERRAIN["white_mountains"])).grid
+
+
+@pytest.mark.benchmark(group="terrain thread of one scan, fan of seven")
+def test_terrain_thread(benchmark: BenchmarkFixture, grid: Grid, pointing: Pointing) -> None:
+    states, _ = benchmark(lambda: predict(grid, pointing, BINS, RANGE_NM * NM_M / BINS, Beam()))
+    assert states.shape == (RADIALS, BINS)
+
+
+@pytest.mark.benchmark(group="terrain thread of one scan, fan of seven")
+def test_the_same_number_of_bilinear_looks(benchmark: BenchmarkFixture, grid: Grid) -> None:
+    lat = np.sort(RNG.uniform(44.1, 44.6, 7 * RADIALS * BINS))  # neighbours lie close, as on a radial
+    assert benchmark(lambda: _look(grid, lat, -71.7)) > 0
+
+
+@pytest.mark.benchmark(group="radar thread of one scan")
+def test_radar_thread(benchmark: BenchmarkFixture) -> None:
+    bins = RNG.integers(0, 5, (RADIALS, BINS), np.uint8)
+    assert benchmark(lambda: radar_states(bins)).shape == bins.shape
+
+
+@pytest.mark.benchmark(group="radar thread of one scan")
+def test_copy_of_the_bins(benchmark: BenchmarkFixture) -> None:
+    bins = RNG.integers(0, 5, (RADIALS, BINS), np.uint8)
+    assert benchmark(bins.copy).shape == bins.shape
+
+
+@njit(cache=True)
+def _look(grid: Grid, lat: NDArray[np.float64], lon: float) -> float:
+    total = 0.0
+    for k in range(lat.size):
+        total += sample(grid, lat[k], lon)
+    return total
