@@ -70,7 +70,10 @@ class Journal:
             self._dropped[adapter] = dropped + len(data)
 
     def report(self, adapter: str, state: str, reason: str = "") -> None:
-        """Take a change of state from any thread."""
+        """Take a change of state from any thread; what the adapter had to drop is told first."""
+        dropped = self._dropped.pop(adapter, 0)
+        if dropped:
+            self.queue.put(Chunk(now(), adapter, b"", dropped), 0)
         self.queue.put(Report(now(), adapter, state, reason), 0)
 
     def run(self) -> None:

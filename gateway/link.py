@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from decoders import formats as f
 from decoders.definitions import Definitions, for_equipment, load_definitions
-from decoders.racklink import Framer, Hello, Packet
+from decoders.racklink import ChannelCount, Framer, Hello, Packet
 from gateway.config import AdapterConfig
 
 SEQUENCE_RANGE = 1 << 32
@@ -42,8 +42,10 @@ class Link:
     radar_profile: str
     framer: Framer = field(default_factory=Framer)
     counters: Counter[str] = field(default_factory=Counter)
+    losses: Counter[str] = field(default_factory=Counter)  # since the last verdict
     channels: dict[int, Channel429 | Channel708] = field(default_factory=dict)
     _next_sequence: int | None = None
+    _lost: dict[int, int] = field(default_factory=dict)  # by channel, as the last heartbeat said
 
     def __post_init__(self) -> None:
         for number, channel in self.config.channels.items():
@@ -76,13 +78,34 @@ class Link:
         for bit, name in FLAG_NAMES.items():
             if packet.flags & bit:
                 self.counters[name] += 1
+        if packet.flags & f.FLAG_FIFO_OVERFLOW:
+            self.losses["overflows in the bridge"] += 1
         if self._next_sequence is not None:
             gap = (packet.sequence - self._next_sequence) % SEQUENCE_RANGE
             if gap < SEQUENCE_RANGE // 2:
                 self.counters["packets_lost"] += gap
+                self.losses["packets lost"] += gap
             else:
                 self.counters["sequence_restarts"] += 1
         self._next_sequence = (packet.sequence + 1) % SEQUENCE_RANGE
+
+    def heartbeat(self, counts: tuple[ChannelCount, ...]) -> None:
+        """Take what the bridge says it lost itself, and count what is new of it."""
+        lost = sum((count.lost - self._lost.get(count.channel, count.lost)) % SEQUENCE_RANGE for count in counts)
+        self._lost |= {count.channel: count.lost for count in counts}
+        self.counters["words_lost_in_bridge"] += lost
+        self.losses["words lost in the bridge"] += lost
+
+    def dropped(self, count: int) -> None:
+        """Count bytes that the gateway had no room for."""
+        self.counters["bytes_dropped"] += count
+        self.losses["bytes dropped"] += count
+
+    def take_losses(self) -> list[str]:
+        """What was lost since the last call, in words."""
+        lost = [f"degraded: {self.config.name}: {count} {what}" for what, count in self.losses.items() if count]
+        self.losses.clear()
+        return lost
 
     def all_counters(self) -> dict[str, int]:
         """Every counter of this bridge by name."""

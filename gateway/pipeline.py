@@ -11,7 +11,7 @@ import numpy as np
 
 from decoders import arinc429, arinc708
 from decoders import formats as f
-from decoders.racklink import MalformedBody, Packet, hello, radar_word, words429
+from decoders.racklink import MalformedBody, Packet, heartbeat, hello, radar_word, words429
 from gateway.config import RackConfig
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
 from gateway.link import Channel429, Channel708, Link
@@ -45,7 +45,7 @@ class Pipeline:
         self._now_ns = 0  # common time of the latest word
         self._heard: dict[str, int] = {}  # adapter -> monotonic time of its last chunk
         self._quiet: set[str] = set()
-        self._losses: list[str] = []  # what the next verdict must own up to
+        self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
         self._scan_number = 0
         self._last: Record | None = None
 
@@ -57,7 +57,7 @@ class Pipeline:
         elif isinstance(record, Status):
             self._counters[f"{record.adapter}.{record.state.lower()}"] += 1
             if record.state in ("LOST", "BEHIND", "FAILED"):
-                self._losses.append(f"degraded: {record.adapter} {record.state}: {record.reason}")
+                self._troubles[record.adapter] = f"degraded: {record.adapter} {record.state}: {record.reason}"
             yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, record.state, record.reason)
         elif isinstance(record, Note):
             yield StatusEvent(record.stamp.utc_ns, record.sequence, "host", "NOTE", record.text)
@@ -81,9 +81,7 @@ class Pipeline:
             self._counters["chunks_of_unknown_adapter"] += 1
             return
         link.counters["chunks"] += 1
-        link.counters["bytes_dropped"] += record.dropped_before
-        if record.dropped_before:
-            self._losses.append(f"degraded: {record.dropped_before} bytes of {record.adapter} were dropped")
+        link.dropped(record.dropped_before)
         yield from self._hear(record.adapter, record)
         for packet in link.framer.feed(record.data):
             link.count(packet)
@@ -107,7 +105,9 @@ class Pipeline:
             self._words(link, packet, record)
         elif packet.type == f.WORD_708:
             yield from self._radar(link, packet, record)
-        elif packet.type not in (f.HEARTBEAT, f.TIME_MARK):
+        elif packet.type == f.HEARTBEAT:
+            link.heartbeat(heartbeat(packet))
+        elif packet.type != f.TIME_MARK:
             link.counters["packets_of_unknown_type"] += 1
 
     def _words(self, link: Link, packet: Packet, record: Raw) -> None:
@@ -157,8 +157,9 @@ class Pipeline:
         if self._monitor is None:
             return
         verdict, comparison = self._monitor.judge(scan, self._aircraft)
-        verdict = replace(verdict, reasons=verdict.reasons + tuple(self._losses))
-        self._losses.clear()
+        losses = [loss for link in self._links.values() for loss in link.take_losses()]
+        verdict = replace(verdict, reasons=(*verdict.reasons, *self._troubles.values(), *losses))
+        self._troubles.clear()
         if self._watcher:
             self._watcher(scan, verdict, comparison)
         yield self._verdict(verdict, self._monitor, record)

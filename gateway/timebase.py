@@ -6,7 +6,7 @@ add, and is let up slowly so that drifting clocks are followed.
 """
 
 DRIFT_PER_S = 1e-4  # what two quartz clocks may drift apart
-RESET_NS = 5_000_000_000  # a device time that steps back this far, or a delay this much longer, is a restarted clock
+RESTART_NS = 1_000_000_000  # a device time that steps back this far is a clock that began anew
 
 
 class Timebase:
@@ -15,19 +15,19 @@ class Timebase:
     def __init__(self) -> None:
         self.restarts = 0
         self._reference: str | None = None
-        self._offsets: dict[str, tuple[float, int]] = {}  # host minus device in ns, and the host time it was seen
+        self._clocks: dict[str, tuple[float, int, int]] = {}  # host minus device, and both times when last seen
 
     def offset_ns(self, adapter: str, device_ns: int, host_ns: int) -> int:
         """What to add to this adapter's device times, given one just read at `host_ns`."""
         if self._reference is None:
             self._reference = adapter
         seen = host_ns - device_ns
-        offset, since = self._offsets.get(adapter, (seen, host_ns))
-        if abs(seen - offset) > RESET_NS and adapter != self._reference:
+        offset, last_host_ns, last_device_ns = self._clocks.get(adapter, (seen, host_ns, device_ns))
+        if device_ns < last_device_ns - RESTART_NS:
             self.restarts += 1
             offset = seen
-        offset = min(seen, offset + (host_ns - since) * DRIFT_PER_S)
-        self._offsets[adapter] = (offset, host_ns)
+        offset = min(seen, offset + (host_ns - last_host_ns) * DRIFT_PER_S)
+        self._clocks[adapter] = (offset, host_ns, device_ns)
         if adapter == self._reference:
             return 0
-        return round(offset - self._offsets[self._reference][0])
+        return round(offset - self._clocks[self._reference][0])

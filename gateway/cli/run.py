@@ -49,6 +49,8 @@ def run(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     service = Service(rack, build_monitor(rack), print_json if json else print_line)
+    if not rack.terrain:
+        print("no terrain given: scans and state only, no verdicts", file=sys.stderr)
     if service.recording_path:
         print(f"recording to {service.recording_path}", file=sys.stderr)
     service.run_until(stop, seconds)
