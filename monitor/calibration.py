@@ -30,7 +30,8 @@ class CheckedRate(BaseModel):
 class Calibration(BaseModel):
     """The file that the monitor loads; bins are range bins of the radar it was measured with."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    # A NaN or an infinite sigma would make Q pass every threshold.
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     name: str
     provenance: str
     bins: int | None = None
@@ -62,17 +63,17 @@ UNCALIBRATED = Calibration(
     name="none",
     provenance="stated defaults: spread and sigma of a beam-averaged radar over mountains, not measured for this radar",
     median_bins=0.0,
-    spread_bins=2.0,
-    sigma_bins=2.2,
-    rms_bins=6.0,
-    variance_factor=1.4,
+    spread_bins=2.2,
+    sigma_bins=2.6,
+    rms_bins=7.0,
+    variance_factor=1.5,
 )
 
 
 def load_calibration(path: Path) -> Calibration:
     """Read a calibration file. Raises ValueError naming the file and what is wrong in it."""
     try:
-        return Calibration.model_validate_json(path.read_text())
+        return Calibration.model_validate_json(path.read_bytes())
     except OSError as error:
         raise ValueError(f"calibration file {path} cannot be read: {error.strerror}") from error
     except ValidationError as error:
@@ -104,6 +105,8 @@ def fit(
     pooled = np.concatenate(usable)
     median = float(np.median(pooled))
     spread = float(median_abs_deviation(pooled, scale="normal"))
+    if not spread:
+        raise ValueError("half of the disparities are equal, so they have no spread: fit to a radar with its noise")
     sigma = float(np.sqrt(np.mean(clipped(pooled, median, CLIP_FACTOR * spread) ** 2)))
     q = np.array([robust_statistic(d, median, CLIP_FACTOR * spread, sigma) for d in usable])
     n = np.array([len(d) for d in usable])

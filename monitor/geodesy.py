@@ -4,7 +4,7 @@ A radial's bins all lie on one geodesic, so latitude and longitude along it are 
 ground distance and evaluated by Horner's rule for every bin. The coefficients are the Taylor series of the geodesic
 equations  phi' = cos(alpha)/M,  lambda' = sin(alpha)/(N cos(phi)),  alpha' = tan(phi) sin(alpha)/N  (WGS 84), where the
 third order neglects the ellipticity. Against pyproj the error stays below a tenth of a range bin at range settings up
-to `LONGEST_RANGE_NM` within 70 degrees of the equator; beyond, the monitor declines.
+to `LONGEST_RANGE_NM` within `HIGHEST_LATITUDE_DEG` of the equator; beyond, the monitor declines.
 """
 
 import math
@@ -22,6 +22,7 @@ NM_M = 1852.0
 FT_M = 0.3048
 KT_M_S = NM_M / 3600
 LONGEST_RANGE_NM = 80.0
+HIGHEST_LATITUDE_DEG = 70.0
 
 
 class Ray(NamedTuple):

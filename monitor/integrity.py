@@ -18,7 +18,7 @@ from monitor.disparity import (
     statistic,
     threshold,
 )
-from monitor.geodesy import LONGEST_RANGE_NM, NM_M, body_to_enu, displace
+from monitor.geodesy import HIGHEST_LATITUDE_DEG, LONGEST_RANGE_NM, NM_M, body_to_enu, displace
 from monitor.prediction import Beam, Pointing, predict
 from monitor.scans import Scan
 from monitor.settings import MonitorSettings
@@ -76,8 +76,8 @@ class Monitor:
         refusal = self._refusal(scan)
         if refusal:
             return self.unavailable(scan.number, [refusal]), None
-        chosen = thin(scan.scan_angle_deg, self.settings.radial_spacing_deg)
-        chosen = chosen[~scan.beyond_limits[chosen]]
+        steady = np.flatnonzero(~scan.beyond_limits)
+        chosen = steady[thin(scan.scan_angle_deg[steady], self.settings.radial_spacing_deg)]
         pointing, usable, reasons = self._point(scan, aircraft, chosen)
         if not usable.any():
             return self.unavailable(scan.number, reasons), None
@@ -91,6 +91,8 @@ class Monitor:
             return f"radar is in mode {scan.mode}, not map: ground returns are filtered out"
         if scan.range_nm > LONGEST_RANGE_NM:
             return f"range setting {scan.range_nm:g} NM is beyond {LONGEST_RANGE_NM:g} NM, where shadows mean nothing"
+        if 2 * scan.repeated > len(scan.time_ns):
+            return f"scanner stuck: the scan angle did not change on {scan.repeated} of {len(scan.time_ns)} radials"
         return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm)
 
     def _point(
@@ -106,6 +108,12 @@ class Monitor:
             for quantity, row in zip(NEEDED, status, strict=True)
             if row.any()
         ]
+        polar = usable & (np.abs(found[0].value) > HIGHEST_LATITUDE_DEG)
+        if polar.any():
+            usable &= ~polar
+            reasons.append(
+                f"{np.count_nonzero(polar)} radials start beyond {HIGHEST_LATITUDE_DEG:g} degrees of latitude"
+            )
         if scan.beyond_limits.any():
             reasons.append(f"{np.count_nonzero(scan.beyond_limits)} radials have attitude or tilt beyond limits")
         lat, lon, height, pitch, roll, heading = (values.value[usable] for values in found)
@@ -125,16 +133,17 @@ class Monitor:
     def _compare(self, scan: Scan, radials: NDArray[np.intp], pointing: Pointing) -> tuple[Comparison, int]:
         s = self.settings
         bins = scan.bins.shape[1]
-        limit = bins if s.range_limit_nm is None else min(bins, int(bins * s.range_limit_nm / scan.range_nm))
-        beam = Beam(s.beam_width_deg, s.azimuth_fan, s.refraction_k, s.range_reference)
+        limit = bins if s.range_limit_nm is None else max(1, min(bins, int(bins * s.range_limit_nm / scan.range_nm)))
+        beam = Beam(s.beam_width_deg, s.azimuth_fan, s.azimuth_span, s.refraction_k, s.range_reference)
         dem, void = predict(self.terrain.grid, pointing, limit, scan.range_nm * NM_M / bins, beam)
         dem, radials = dem[~void], radials[~void]
         radar = radar_states(scan.bins[radials, :limit])
         seen = shadows(radar, "radar", s.minimum_size, s.maximum_size)
         predicted = shadows(dem, "dem", s.minimum_size, s.maximum_size)
-        pairs = pair(seen, predicted)
-        pairs = pairs[~seen["range_limited"][pairs["radar"]]]
-        d = seen["centre"][pairs["radar"]] - predicted["centre"][pairs["dem"]]
+        # Range-limited shadows stay out before pairing: one of them must not take the place of a whole one.
+        whole, foreseen = seen[~seen["range_limited"]], predicted[~predicted["range_limited"]]
+        pairs = pair(whole, foreseen)
+        d = whole["centre"][pairs["radar"]] - foreseen["centre"][pairs["dem"]]
         return Comparison(
             scan.scan_angle_deg[radials],
             radar,

@@ -1,9 +1,9 @@
 """The terrain thread: which range bins the stored terrain should light, for every radial of a scan.
 
 Young, Uijt de Haag and Campbell (2004), section 1.2, with three refinements a real beam needs. The thread runs on a
-fan of azimuths across the beam and a bin is lit if any of them lights it; the ground point of a bin lies at its *slant* range;
-the Earth's curvature with standard refraction lowers far terrain. Tangents are taken of the true elevation, with the
-horizontal distance below the line where eq. (5) writes the slant range, since the beam's limits are tangents too.
+fan of azimuths across the beam and a bin is lit if any of them lights it; the ground point of a bin lies at its *slant*
+range; the Earth's curvature with standard refraction lowers far terrain. Tangents are taken of the true elevation, with
+the horizontal distance below the line where eq. (5) writes the slant range, since the beam's limits are tangents too.
 """
 
 import math
@@ -22,7 +22,8 @@ class Beam(NamedTuple):
     """How the antenna is modelled."""
 
     width_deg: float = 3.5  # one-way 3 dB
-    azimuth_fan: int = 7  # sub-azimuths over the beam width; 1 is the paper's boresight form
+    azimuth_fan: int = 7  # sub-azimuths; 1 is the paper's boresight form
+    azimuth_span: float = 0.75  # beam widths each side: there ground 14 dB over the first level falls below it
     refraction_k: float = 4 / 3  # effective Earth radius factor; inf is the paper's flat Earth
     range_reference: str = "centre"  # or "far_edge", the paper's R_j = j dR
 
@@ -43,9 +44,9 @@ def predict(
     """States of the terrain thread i1 (n, bins), and which radials (n,) met a void post or left the terrain."""
     offset = {"centre": 0.5, "far_edge": 0.0}[beam.range_reference]
     ranges_m = (np.arange(1, bins + 1) - offset) * bin_width_m
-    half = math.radians(beam.width_deg) / 2
-    fan = half * np.linspace(-1, 1, beam.azimuth_fan) if beam.azimuth_fan > 1 else np.zeros(1)
-    states, void = _predict(grid, *pointing, ranges_m, half, fan, beam.refraction_k)
+    width = math.radians(beam.width_deg)
+    fan = width * beam.azimuth_span * np.linspace(-1, 1, beam.azimuth_fan) if beam.azimuth_fan > 1 else np.zeros(1)
+    states, void = _predict(grid, *pointing, ranges_m, width / 2, fan, beam.refraction_k)
     return states, void
 
 
@@ -82,9 +83,9 @@ def tangents(
 ) -> bool:
     """Tangent of the elevation of the ground at each slant range, into `delta`; True if any post was missing.
 
-    Bins nearer than the ground below get -infinity, those from the first missing post on NaN. In the triangle of antenna,
-    ground and the Earth's centre the slant range squared is the height difference squared plus the square of the chord
-    at the mean height, whatever the curvature, so only the elevation sees the drop.
+    Bins nearer than the ground below get -infinity, those from the first missing post on NaN. In the triangle of
+    antenna, ground and the Earth's centre the slant range squared is the height difference squared plus the square of
+    the chord at the mean height, whatever the curvature, so only the elevation sees the drop.
     """
     meridian, prime = curvature_radii(math.radians(latitude_deg))
     twice_radius = 2 * k * math.sqrt(meridian * prime)

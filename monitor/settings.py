@@ -28,7 +28,8 @@ class MonitorSettings(BaseModel):
         None, ge=2, description="pairs below which T is unavailable; 16 if not set, 20 for p_fa of 1e-4 and below"
     )
     beam_width_deg: float = Field(3.5, gt=0.1, le=30, description="one-way 3 dB width of the antenna beam")
-    azimuth_fan: int = Field(7, ge=1, le=99, description="sub-azimuths over the beam width; 1 is the paper's form")
+    azimuth_fan: int = Field(7, ge=1, le=99, description="sub-azimuths across the beam; 1 is the paper's form")
+    azimuth_span: float = Field(0.75, gt=0, le=2, description="how far the fan reaches each side, beam widths")
     refraction_k: float = Field(
         4 / 3, gt=0, description="effective Earth radius factor; inf for the paper's flat Earth"
     )

@@ -15,11 +15,12 @@ import numpy as np
 import rasterio
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
+from rasterio.crs import CRS
 from rasterio.enums import Resampling
 from rasterio.errors import RasterioError
 from rasterio.vrt import WarpedVRT
 
-WGS84 = "EPSG:4326"
+WGS84 = CRS.from_epsg(4326)
 ALIGNMENT_POSTS = 0.05  # files whose posts miss a common grid by more are refused: resampling is not ours to hide
 
 
@@ -75,9 +76,11 @@ def _read(path: Path) -> Grid:
         with rasterio.open(path) as source:
             if source.crs is None:
                 raise TerrainError(f"{path} has no coordinate reference system: assign one with gdal_edit.py -a_srs")
-            if source.crs.is_geographic:
+            if source.crs == WGS84:
                 return _grid(source)
-            with WarpedVRT(source, crs=WGS84, resampling=Resampling.bilinear) as geographic:
+            # The warped raster has corners that the source does not reach: NaN, or they would read as 0 m.
+            warp = {"crs": WGS84, "resampling": Resampling.bilinear, "nodata": math.nan, "dtype": "float32"}
+            with WarpedVRT(source, **warp) as geographic:
                 return _grid(geographic)
     except RasterioError as error:
         raise TerrainError(f"{path} cannot be read as terrain (GeoTIFF, HGT or DTED): {error}") from error
@@ -95,20 +98,22 @@ def _mosaic(tiles: list[Grid], paths: list[Path]) -> Grid:
     first = tiles[0]
     if len(tiles) == 1:
         return first
-    north = max(tile.north_deg for tile in tiles)
-    west = min(tile.west_deg for tile in tiles)
-    corners = [_corner(tile, first, north, west, path) for tile, path in zip(tiles, paths, strict=True)]
+    offsets = [_offset(tile, first, path) for tile, path in zip(tiles, paths, strict=True)]
+    top, left = min(row for row, _ in offsets), min(column for _, column in offsets)
+    corners = [(row - top, column - left) for row, column in offsets]
     rows = max(row + tile.height_m.shape[0] for (row, _), tile in zip(corners, tiles, strict=True))
     columns = max(column + tile.height_m.shape[1] for (_, column), tile in zip(corners, tiles, strict=True))
     height_m = np.full((rows, columns), np.nan, np.float32)
     for (row, column), tile in zip(corners, tiles, strict=True):
         place = height_m[row : row + tile.height_m.shape[0], column : column + tile.height_m.shape[1]]
         np.copyto(place, tile.height_m, where=np.isnan(place))
-    return Grid(height_m, north, west, first.row_deg, first.column_deg)
+    north_deg, west_deg = first.north_deg - top * first.row_deg, first.west_deg + left * first.column_deg
+    return Grid(height_m, north_deg, west_deg, first.row_deg, first.column_deg)
 
 
-def _corner(tile: Grid, first: Grid, north: float, west: float, path: Path) -> tuple[int, int]:
-    row, column = (north - tile.north_deg) / first.row_deg, (tile.west_deg - west) / first.column_deg
+def _offset(tile: Grid, first: Grid, path: Path) -> tuple[int, int]:
+    row = (first.north_deg - tile.north_deg) / first.row_deg
+    column = (tile.west_deg - first.west_deg) / first.column_deg
     same_spacing = math.isclose(tile.row_deg, first.row_deg, rel_tol=1e-6) and math.isclose(
         tile.column_deg, first.column_deg, rel_tol=1e-6
     )
@@ -127,9 +132,9 @@ def sample(grid: Grid, latitude_deg: float, longitude_deg: float) -> float:
         return math.nan
     i, j = min(int(row), rows - 2), min(int(column), columns - 2)
     u, v = row - i, column - j
-    upper: float = grid.height_m[i, j] * (1 - v) + grid.height_m[i, j + 1] * v
-    lower: float = grid.height_m[i + 1, j] * (1 - v) + grid.height_m[i + 1, j + 1] * v
-    return upper * (1 - u) + lower * u
+    upper = grid.height_m[i, j] * (1 - v) + grid.height_m[i, j + 1] * v
+    lower = grid.height_m[i + 1, j] * (1 - v) + grid.height_m[i + 1, j + 1] * v
+    return float(upper * (1 - u) + lower * u)
 
 
 @njit(cache=True)

@@ -70,11 +70,13 @@ class Track:
         span = times[after] - times[before]
         reach = np.maximum(span, np.maximum(time_ns - times[after], times[before] - time_ns))
         status = np.maximum(statuses[before], statuses[after])
-        status[(reach > self.quantity.longest_gap_s / NS) & (status == NORMAL)] = STALE
+        status[(reach > round(self.quantity.longest_gap_s / NS)) & (status == NORMAL)] = STALE
         step = values[after] - values[before]
         if self.quantity.angle:
             step = wrap(step)
-        value = values[before] + step * ((time_ns - times[before]) / np.maximum(span, 1))
+        # Two samples of one instant have no slope: the later one stands.
+        fraction = np.where(span > 0, (time_ns - times[before]) / np.maximum(span, 1), 1.0)
+        value = values[before] + step * fraction
         if self.quantity.angle:
             value = wrap(value)
         return Values(np.where(status == NORMAL, value, 0.0), status)

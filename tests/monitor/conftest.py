@@ -1,0 +1,34 @@
+"""Settings and real terrain for the monitor's tests."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+from monitor.terrain import Terrain, open_terrain
+
+# The first example of a run may compile a kernel, so a time limit on an example would measure the compiler.
+settings.register_profile("compiled", deadline=None)
+settings.load_profile("compiled")
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="session")
+def white_mountains_path() -> Path:
+    return ROOT / "simulators/data/terrain/N44W072.hgt"
+
+
+@pytest.fixture(scope="session")
+def sierra_path() -> Path:
+    return ROOT / "tests/data/terrain/sierra_nevada_1arcsec_wgs84.tif"
+
+
+@pytest.fixture(scope="session")
+def sao_tome_path() -> Path:
+    return ROOT / "tests/data/terrain/n00_e006_3arc_v2.dt1"
+
+
+@pytest.fixture(scope="session")
+def white_mountains(white_mountains_path: Path) -> Terrain:
+    return open_terrain(white_mountains_path)
