@@ -1,7 +1,7 @@
 """How soon a verdict comes: the real command on a pseudo-terminal at real bus rates. `make latency`.
 
-Prints the time from the start of the process to its open line, and from the last byte of each full scan to its verdict.
-Run it twice: the first start on a machine compiles the kernels.
+Prints how long --help takes, the time from the start of the process to its open line, and from the first word after
+each full scan to the scan's verdict. Run it twice: the first start on a machine compiles the kernels.
 """
 
 import json
@@ -19,6 +19,7 @@ from simulators.traffic import traffic
 
 SWEEP_NS = 361 * 12_500_000  # 361 radials, 80 a second
 SWEEPS = 4
+HELP_RUNS = 5
 
 
 def main() -> None:
@@ -39,10 +40,17 @@ def main() -> None:
             line.close()
             gateway.send_signal(signal.SIGTERM)
             reader.join()
+    print(f"shadebus --help: {min(_help() for _ in range(HELP_RUNS)):.2f} s, the best of {HELP_RUNS}")
     print(f"process start to open line: {seen['open'] - began:.2f} s")
     for sweep in range(SWEEPS):
         delay_ms = (seen[f"scan {sweep}"] - written[sweep]) * 1e3
         print(f"first word after scan {sweep} written to its verdict on stdout: {delay_ms:.1f} ms")
+
+
+def _help() -> float:
+    began = time.monotonic()
+    subprocess.run([sys.executable, "-m", "gateway", "--help"], check=True, capture_output=True)  # our own
+    return time.monotonic() - began
 
 
 def _timed(packets: Iterator[tuple[int, bytes]], written: dict[int, float]) -> Iterator[tuple[int, bytes]]:

@@ -106,6 +106,13 @@ class Framer:
         names = ("received", "framed", "skipped", "pending", "bad_crc", "bad_cobs", "oversize", "unknown_version")
         return {name: getattr(self, name) for name in names}
 
+    def succeed(self, before: "Framer") -> None:
+        """Take over the counts of a framer that is given up; what it still had pending counts as skipped."""
+        for name, count in before.counters().items():
+            if name != "pending":
+                setattr(self, name, count)
+        self.skipped += before.pending
+
     def feed(self, data: bytes) -> list[Packet]:
         """Packets completed by the next bytes of a stream (COBS, each closed by 0x00)."""
         self.received += len(data)

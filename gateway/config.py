@@ -2,10 +2,12 @@
 
 import tomllib
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from decoders.definitions import load_definitions
+from decoders.profiles import load_profile
 from gateway.errors import GatewayError
 from monitor.settings import MonitorSettings
 
@@ -14,20 +16,39 @@ class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+def _known_definitions(name: str) -> str:
+    try:
+        load_definitions(name)
+    except OSError as error:
+        raise ValueError(f"definitions {name} cannot be read: {error.strerror}") from error
+    return name
+
+
+def _known_profile(name: str) -> str:
+    load_profile(name)
+    return name
+
+
+DefinitionsName = Annotated[str, AfterValidator(_known_definitions)]
+ProfileName = Annotated[str, AfterValidator(_known_profile)]
+
+
 class ChannelConfig(_Section):
     """What a channel of a bridge carries, where its hello packet does not say so or says too little."""
 
     kind: Literal["arinc429", "arinc708"]
-    definitions: str | None = Field(None, description="label set by name, or a TOML file of one")
+    definitions: DefinitionsName | None = Field(None, description="label set by name, or a TOML file of one")
     orientation: Literal["wire", "label_swapped"] = "wire"
-    profile: str | None = Field(None, description="ARINC 708 profile")
+    profile: ProfileName | None = Field(None, description="ARINC 708 profile")
 
 
 class AdapterConfig(_Section):
     """One bridge: its name in the recording and where it is."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_-]+$")
-    source: str = Field(pattern=r"^serial:.+", description="serial:DEVICE, serial:socket://..., serial:rfc2217://...")
+    source: str = Field(
+        pattern=r"^[a-z0-9]+:.+", description="serial:DEVICE, serial:socket://..., serial:rfc2217://..."
+    )
     baud: int = Field(921_600, ge=300, le=12_000_000, description="bit/s of a serial line")
     channels: dict[int, ChannelConfig] = Field(default_factory=dict, description="by channel number")
 
@@ -43,13 +64,23 @@ class RecordingConfig(_Section):
 class RackConfig(_Section):
     """Everything `shadebus run` needs."""
 
-    adapters: tuple[AdapterConfig, ...] = Field(min_length=1)
+    adapters: tuple[AdapterConfig, ...]
     recording: RecordingConfig | None = None
     terrain: tuple[Path, ...] = Field((), description="GeoTIFF, HGT or DTED files")
     calibration: Path | None = Field(None, description="made by `shadebus calibrate`; stated defaults without")
-    radar_profile: str = Field("arinc708", description="ARINC 708 profile of radar channels that name none")
+    radar_profile: ProfileName = Field("arinc708", description="ARINC 708 profile of radar channels that name none")
     monitor: MonitorSettings = MonitorSettings()
     wait_for_devices: bool = Field(False, description="start although a device is not there yet, and keep trying")
+
+    @model_validator(mode="after")
+    def _adapters_have_names_of_their_own(self) -> Self:
+        names = [adapter.name for adapter in self.adapters]
+        if not names:
+            raise ValueError("adapters: name at least one, as [[adapters]] with name and source")
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two adapters are named {name!r}: give each a name of its own")
+        return self
 
 
 def load_config(path: Path) -> RackConfig:
@@ -61,7 +92,7 @@ def load_config(path: Path) -> RackConfig:
         table = tomllib.loads(path.read_text())
     except OSError as error:
         raise GatewayError(f"cannot read configuration {path}: {error.strerror}") from error
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # not TOML, or not even text
         raise GatewayError(f"configuration {path} is not TOML: {error}") from error
     config = check_config(table, str(path))
     base = path.absolute().parent
@@ -82,7 +113,7 @@ def check_config(table: dict[str, object], origin: str) -> RackConfig:
         return RackConfig.model_validate(table)
     except ValidationError as error:
         problems = "; ".join(
-            f"{'.'.join(str(part) for part in problem['loc']) or 'the file'}: {problem['msg']}"
+            f"{'.'.join(str(part) for part in problem['loc']) or 'the whole'}: {problem['msg']}"
             for problem in error.errors()
-        )
+        ).replace("Value error, ", "")
         raise GatewayError(f"{origin}: {problems}") from error

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from gateway.events import Event
 from gateway.pipeline import Pipeline
 from gateway.queues import ByteQueue
-from gateway.records import Raw, Record
+from gateway.records import Raw, Record, Status
 
 LIMIT_BYTES = 64 << 20
 
@@ -18,29 +18,46 @@ Emit = Callable[[Event], None]
 
 
 class Core:
-    """Runs records through a pipeline that is rebuilt when it fails."""
+    """Runs records through a pipeline; when it fails, `build` makes its successor from it."""
 
-    def __init__(self, build: Callable[[], Pipeline], emit: Emit, report: Callable[[str], None]) -> None:
+    def __init__(self, build: Callable[[Pipeline | None], Pipeline], emit: Emit, report: Callable[[str], None]) -> None:
         self.failures = 0
         self._build = build
         self._emit = emit
         self._report = report
-        self._pipeline = build()
+        self._unheard = False
+        self._pipeline = build(None)
 
     def process(self, record: Record) -> None:
         """Emit the events of one record."""
         try:
             for event in self._pipeline.feed(record):
-                self._emit(event)
+                self._say(event)
         except Exception as error:  # noqa: BLE001 # a defect in decoding must not end the flight's monitoring
-            self.failures += 1
-            self._report(f"record {record.sequence}: {type(error).__name__}: {error}")
-            self._pipeline = self._build()
+            self._failed(f"record {record.sequence}", error)
+            self._pipeline = self._build(self._pipeline)
 
     def finish(self) -> None:
         """Emit what is left, and the summary."""
-        for event in self._pipeline.finish():
+        try:
+            for event in self._pipeline.finish():
+                self._say(event)
+        except Exception as error:  # noqa: BLE001
+            self._failed("end", error)
+
+    def _say(self, event: Event) -> None:
+        """Emit, until that fails: an event that told of it would fail again, and so on for ever."""
+        if self._unheard:
+            return
+        try:
             self._emit(event)
+        except Exception as error:  # noqa: BLE001 # whoever listens has left; recording and judging go on
+            self._unheard = True
+            self._failed("events reach nobody any more", error)
+
+    def _failed(self, what: str, error: Exception) -> None:
+        self.failures += 1
+        self._report(f"{what}: {type(error).__name__}: {error}")
 
 
 class CoreQueue:
@@ -57,7 +74,7 @@ class CoreQueue:
             size = len(record.data) if isinstance(record, Raw) else 0
             if not self.queue.put(record, size):
                 self._skipped += 1
-            elif self._skipped and size:
+            elif self._skipped and not isinstance(record, Status):  # or the report would report itself
                 self._report(f"{self._skipped} records skipped")
                 self._skipped = 0
 

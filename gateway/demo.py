@@ -20,6 +20,7 @@ from typing import Any
 import rasterio
 from pyproj import Geod
 from rasterio.transform import Affine
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.progress import Progress, TaskID
 from rich.table import Table
@@ -78,8 +79,8 @@ def fly(out: Path, seed: int, speed: float) -> None:
     failing = ({"name": "gnss_no_computed_data", "start_s": GNSS_FAILS_S},)
     legs = [
         Leg("true", "true terrain", true_terrain, "ok"),
-        Leg("shifted", f"terrain shifted {SHIFT_EAST_M:.0f} m east", shifted, "alert"),
-        Leg("gnss", f"GNSS failing after {GNSS_FAILS_S:.0f} s", true_terrain, "unavailable", failing),
+        Leg("shifted", f"terrain {SHIFT_EAST_M:.0f} m east", shifted, "alert"),
+        Leg("gnss", f"GNSS fails at {GNSS_FAILS_S:.0f} s", true_terrain, "unavailable", failing),
     ]
     console.print(
         f"Three legs of {LEG_S:.0f} s over the White Mountains at {speed:g} times real bus rates, P_FA {P_FA:g}"
@@ -88,7 +89,7 @@ def fly(out: Path, seed: int, speed: float) -> None:
         _live(leg, out, seed, speed, console)
         _again(leg)
     _table(legs, console)
-    report = write_report(out / "report", {leg.title: leg.pictures for leg in legs})
+    report = write_report(out / "report", {leg.title: leg.pictures for leg in legs}, P_FA)
     console.print(f"recordings in {out}, report in {report}")
     wrong = [f"{leg.title}: {leg.outcome}, not {leg.expected}" for leg in legs if leg.outcome != leg.expected]
     wrong += [f"{leg.title}: replay differs from live" for leg in legs if not leg.identical]
@@ -195,17 +196,16 @@ def _again(leg: Leg) -> None:
 
 
 def _table(legs: list[Leg], console: Console) -> None:
-    table = Table("leg", "scans", "ok", "alert", "unavailable", "pairs", "last verdict", "as it must be", "replay")
+    table = Table("leg", OK, ALERT, "unavail.", "pairs", "last verdict", "replay", box=SIMPLE)
     for leg in legs:
         count = Counter(event["verdict"] for event in leg.verdicts)
         pairs = sorted(event["n_pairs"] for event in leg.verdicts) or [0]
         table.add_row(
             leg.title,
-            str(len(leg.verdicts)),
             *(str(count[verdict]) for verdict in (OK, ALERT, UNAVAILABLE)),
             f"{pairs[0]} to {pairs[-1]}",
-            f"[{COLOURS.get(leg.outcome, 'white')}]{leg.outcome}[/]",
-            "yes" if leg.outcome == leg.expected else "NO",
+            f"[{COLOURS.get(leg.outcome, 'white')}]{leg.outcome}[/]"
+            + ("" if leg.outcome == leg.expected else f", expected {leg.expected}"),
             "identical" if leg.identical else "DIFFERS",
         )
     console.print(table)

@@ -88,7 +88,10 @@ class Journal:
                 self._keep(records)
                 self._deliver(records)
         if self._recorder and not self.recording_error:
-            self._recorder.close()
+            try:
+                self._recorder.close()
+            except OSError as error:  # no room for the index; the records are in the file
+                self._give_up(self._recorder, error)
 
     def _numbered(self, item: Chunk | Report) -> Record:
         sequence = self._next()
@@ -119,9 +122,12 @@ class Journal:
                 self._recorder.sync()
                 self._last_sync_ns = records[-1].stamp.monotonic_ns
         except OSError as error:
-            self.recording_error = f"{self._recorder.path}: {error.strerror}; make room and restart"
-            self._recorder.abandon()
+            self._give_up(self._recorder, error)
             records.append(Status(self._next(), now(), "recording", "FAILED", self.recording_error))
+
+    def _give_up(self, recorder: Recorder, error: OSError) -> None:
+        self.recording_error = f"{recorder.path}: {error.strerror}; make room and restart"
+        recorder.abandon()
 
     def _next(self) -> int:
         self._sequence += 1

@@ -42,6 +42,7 @@ class Link:
     radar_profile: str
     framer: Framer = field(default_factory=Framer)
     counters: Counter[str] = field(default_factory=Counter)
+    unknown: set[int] = field(default_factory=set)  # channels whose words nobody can read, and that have been told
     losses: Counter[str] = field(default_factory=Counter)  # since the last verdict
     channels: dict[int, Channel429 | Channel708] = field(default_factory=dict)
     _next_sequence: int | None = None
@@ -55,19 +56,25 @@ class Link:
                 definitions = load_definitions(channel.definitions)
                 self.channels[number] = Channel429(definitions.equipment_id & 0xFF, definitions, channel.orientation)
 
+    def succeed(self, before: "Link") -> None:
+        """Take over the channels and counters of a link whose pipeline failed; bytes half framed are lost with it."""
+        self.channels, self.counters, self.losses = before.channels, before.counters, before.losses
+        self.framer.succeed(before.framer)
+
     def hello(self, hello: Hello) -> None:
         """Take what the bridge says of its channels; what the configuration says goes first."""
         for said in hello.channels:
-            if said.channel in self.config.channels:
+            configured = self.config.channels.get(said.channel)
+            if configured and (configured.kind == "arinc708" or configured.definitions):
                 continue
-            if said.kind == f.KIND_708:
+            if said.kind == f.KIND_708 and not configured:
                 self.channels[said.channel] = Channel708(self.radar_profile)
             elif said.kind in (f.KIND_429_LOW, f.KIND_429_HIGH) and said.orientation < len(f.ORIENTATIONS):
                 name = for_equipment(said.equipment_id)
                 if name is None:
                     self.counters["channels_of_unknown_equipment"] += 1
                 else:
-                    orientation = f.ORIENTATIONS[said.orientation]
+                    orientation = configured.orientation if configured else f.ORIENTATIONS[said.orientation]
                     self.channels[said.channel] = Channel429(said.equipment_id, load_definitions(name), orientation)
             else:
                 self.counters["channels_of_unknown_kind"] += 1

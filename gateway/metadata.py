@@ -1,5 +1,6 @@
 """What a recording says of itself: enough to replay it exactly, and to know what made it."""
 
+import json
 import platform
 from importlib.metadata import version
 from pathlib import Path
@@ -8,7 +9,7 @@ from pydantic import ValidationError
 
 from gateway.config import RackConfig
 from gateway.errors import GatewayError
-from monitor.calibration import Calibration, load_calibration
+from monitor.calibration import UNCALIBRATED, Calibration, load_calibration
 from monitor.integrity import Monitor
 from monitor.terrain import TerrainError, open_terrain
 
@@ -28,7 +29,8 @@ def build_monitor(config: RackConfig, calibration: Calibration | None = None) ->
 def describe(config: RackConfig, monitor: Monitor | None) -> dict[str, str]:
     """The metadata of a new recording."""
     return {
-        "configuration": config.model_dump_json(),
+        # not model_dump_json, which writes an infinite number as null and so could not read it back
+        "configuration": json.dumps(config.model_dump(mode="json")),
         "calibration": monitor.calibration.model_dump_json() if monitor else "",
         "terrain_checksum": monitor.terrain.checksum if monitor else "",
         "shadebus": version("shadebus"),
@@ -51,7 +53,12 @@ def recorded_monitor(metadata: dict[str, str], config: RackConfig, terrain: tupl
 
     Raises GatewayError if the recorded files are not there any more or have changed.
     """
-    calibration = Calibration.model_validate_json(metadata["calibration"]) if metadata["calibration"] else None
+    try:
+        calibration = Calibration.model_validate_json(metadata["calibration"]) if metadata["calibration"] else None
+    except (KeyError, ValidationError) as error:
+        raise GatewayError("the recording's metadata holds no calibration that this version understands") from error
+    if calibration == UNCALIBRATED:
+        calibration = UNCALIBRATED  # itself, by which the monitor knows it
     if terrain:
         config = config.model_copy(update={"terrain": terrain})
     monitor = build_monitor(config, calibration)

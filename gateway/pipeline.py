@@ -31,9 +31,18 @@ Watcher = Callable[[Scan, Verdict, Comparison | None], None]
 
 
 class Pipeline:
-    """Feed it records in order; it gives events. `watcher` sees each scan with its verdict, for reports."""
+    """Feed it records in order; it gives events. `watcher` sees each scan with its verdict, for reports.
 
-    def __init__(self, config: RackConfig, monitor: Monitor | None, watcher: Watcher | None = None) -> None:
+    A pipeline that follows one that failed takes over its counters and what it knew of the channels, and nothing else.
+    """
+
+    def __init__(
+        self,
+        config: RackConfig,
+        monitor: Monitor | None,
+        watcher: Watcher | None = None,
+        before: "Pipeline | None" = None,
+    ) -> None:
         self._config = config
         self._monitor = monitor
         self._watcher = watcher
@@ -43,11 +52,17 @@ class Pipeline:
         self._scans = ScanBuilder()
         self._counters: Counter[str] = Counter()
         self._now_ns = 0  # common time of the latest word
+        self._now_host_ns: int | None = None  # and when that word was read
         self._heard: dict[str, int] = {}  # adapter -> monotonic time of its last chunk
         self._quiet: set[str] = set()
         self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
         self._scan_number = 0
         self._last: Record | None = None
+        if before:
+            self._counters = before._counters
+            self._scans.number = before._scans.number
+            for name, link in self._links.items():
+                link.succeed(before._links[name])
 
     def feed(self, record: Record) -> Iterator[Event]:
         """The events that one record causes."""
@@ -56,6 +71,8 @@ class Pipeline:
             yield from self._raw(record)
         elif isinstance(record, Status):
             self._counters[f"{record.adapter}.{record.state.lower()}"] += 1
+            if record.state == "UP":  # a line that never gives a byte is quiet too
+                self._heard.setdefault(record.adapter, record.stamp.monotonic_ns)
             if record.state in ("LOST", "BEHIND", "FAILED"):
                 self._troubles[record.adapter] = f"degraded: {record.adapter} {record.state}: {record.reason}"
             yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, record.state, record.reason)
@@ -102,7 +119,7 @@ class Pipeline:
         if packet.type == f.HELLO:
             link.hello(hello(packet))
         elif packet.type == f.WORDS_429:
-            self._words(link, packet, record)
+            yield from self._words(link, packet, record)
         elif packet.type == f.WORD_708:
             yield from self._radar(link, packet, record)
         elif packet.type == f.HEARTBEAT:
@@ -110,12 +127,22 @@ class Pipeline:
         elif packet.type != f.TIME_MARK:
             link.counters["packets_of_unknown_type"] += 1
 
-    def _words(self, link: Link, packet: Packet, record: Raw) -> None:
+    def _unknown(
+        self, link: Link, packet: Packet, channel: Channel429 | Channel708 | None, record: Raw
+    ) -> Iterator[Event]:
+        """Say once that a channel carries words of which neither hello nor configuration says what they are."""
+        if channel is None and packet.channel not in link.unknown:
+            link.unknown.add(packet.channel)
+            reason = f"channel {packet.channel} is recorded but not used until a hello or [adapters.channels] names it"
+            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "UNKNOWN_CHANNEL", reason)
+
+    def _words(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         block = words429(packet)
         link.counters["words_429"] += len(block.words)
         if not block.well_formed:
             link.counters["malformed_bodies"] += 1
         channel = link.channels.get(packet.channel)
+        yield from self._unknown(link, packet, channel, record)
         if not isinstance(channel, Channel429) or packet.flags & SPOILT or not len(block.words):
             link.counters["words_429_unused"] += len(block.words)
             return
@@ -124,20 +151,21 @@ class Pipeline:
             if status and count:
                 link.counters[f"words_429_{arinc429.Status(status).name.lower()}"] += count
         times = block.time_ns + self._timebase.offset_ns(record.adapter, packet.time_ns, record.stamp.monotonic_ns)
-        self._now_ns = int(times[-1])
+        self._now_ns, self._now_host_ns = int(times[-1]), record.stamp.monotonic_ns
         self._aircraft.feed(channel.equipment, times, block.words, values)
 
     def _radar(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         word = radar_word(packet)
         link.counters["words_708"] += 1
         channel = link.channels.get(packet.channel)
+        yield from self._unknown(link, packet, channel, record)
         if not isinstance(channel, Channel708) or packet.flags & SPOILT or word.bit_count != f.WORD_708_BITS:
             link.counters["words_708_unused"] += 1
             return
         yield from self._hear(RADAR, record)
         radials = arinc708.unpack(np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile)
         offset = self._timebase.offset_ns(record.adapter, packet.time_ns, record.stamp.monotonic_ns)
-        self._now_ns = packet.time_ns + offset
+        self._now_ns, self._now_host_ns = packet.time_ns + offset, record.stamp.monotonic_ns
         for scan in self._scans.feed(np.array([self._now_ns]), radials):
             yield from self._judge(scan, record)
 
@@ -187,7 +215,7 @@ class Pipeline:
         yield self._state(record)
 
     def _state(self, record: Tick) -> StateEvent:
-        silent_ns = record.stamp.monotonic_ns - max(self._heard.values(), default=record.stamp.monotonic_ns)
+        silent_ns = record.stamp.monotonic_ns - (self._now_host_ns or record.stamp.monotonic_ns)
         now_ns = self._now_ns + silent_ns  # without words the state must still grow old
         values: dict[str, float | None] = {}
         validity: dict[str, str] = {}

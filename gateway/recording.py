@@ -11,7 +11,7 @@ from io import BufferedReader
 from pathlib import Path
 
 from mcap.exceptions import McapError
-from mcap.records import Channel, DataEnd, Message
+from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
@@ -82,13 +82,13 @@ class Recorder:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._sink = _Sink(path)
+            self._writer = Writer(self._sink, use_chunking=False)  # type: ignore[arg-type] # needs write and tell only
+            self._channels: dict[str, int] = {}
+            self._writer.start(profile=PROFILE, library="shadebus")
+            self._writer.add_metadata("shadebus", metadata)
+            self._sink.commit()
         except OSError as error:
             raise GatewayError(f"cannot record to {path}: {error.strerror}; choose another directory") from error
-        self._writer = Writer(self._sink, use_chunking=False)  # type: ignore[arg-type] # it needs write and tell only
-        self._channels: dict[str, int] = {}
-        self._writer.start(profile=PROFILE, library="shadebus")
-        self._writer.add_metadata("shadebus", metadata)
-        self._sink.commit()
 
     def append(self, records: Sequence[Record]) -> None:
         """Add records in order. Raises OSError if the disk does not take all of them; then none is in the file."""
@@ -144,7 +144,7 @@ class Recording:
                     raise GatewayError(f"{path} is an MCAP file, but not a shadebus recording")
                 self.metadata = getattr(next(items, None), "metadata", {})
             except (*TORN, StopIteration) as error:
-                raise GatewayError(f"{path} is not a shadebus recording: {error or 'it is too short'}") from error
+                raise GatewayError(f"{path} is not a shadebus recording: {str(error) or 'it is too short'}") from error
 
     def __iter__(self) -> Iterator[Record]:
         self.records, self.damaged, self.torn = 0, 0, ""
@@ -154,10 +154,10 @@ class Recording:
             while True:
                 try:
                     item = next(items)
-                except (*TORN, StopIteration) as error:
-                    self.torn = f"the file ends without its index after {self.records} records ({type(error).__name__})"
+                except StopIteration:  # behind the closing magic
                     return
-                if isinstance(item, DataEnd):
+                except TORN as error:
+                    self.torn = f"the file ends without its index after {self.records} records ({type(error).__name__})"
                     return
                 if isinstance(item, Channel):
                     topics[item.id] = item.topic

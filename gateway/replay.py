@@ -26,7 +26,7 @@ def replay(
 
     `start_s` and `stop_s` count from the first record; what lies outside is not fed at all.
     """
-    core = Core(lambda: Pipeline(config, monitor, watcher), emit, report)
+    core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, report)
     began_ns = time.monotonic_ns()
     first_ns: int | None = None
     for record in recording:

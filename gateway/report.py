@@ -13,12 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from monitor.disparity import threshold
 from monitor.integrity import Comparison, Verdict
 from monitor.scans import Scan
 
 LIT, SHADOW, UNSEEN = "#2f8f4e", "#101418", "#c9d1d9"
 VERDICT_COLOURS = {"ok": "#2f8f4e", "alert": "#c62828", "unavailable": "#b38600"}
-LEGEND = [Line2D([], [], ls="", marker="o", color=colour, label=name) for name, colour in VERDICT_COLOURS.items()]
+LEGEND = [Line2D([], [], ls="", marker="o", color=c, label=f"Q: {name}") for name, c in VERDICT_COLOURS.items()]
+LEGEND.append(Line2D([], [], ls="", marker="x", color="#8899aa", label="T as published"))
 LEVELS = ListedColormap(["#101418", "#2f8f4e", "#d7c32d", "#c62828", "#b63bb6"])
 STATES = ListedColormap([UNSEEN, SHADOW, LIT])
 
@@ -32,12 +34,12 @@ class Picture:
     comparison: Comparison | None
 
 
-def write_report(directory: Path, legs: Mapping[str, Sequence[Picture]]) -> Path:
-    """Write pictures and `index.html` into a directory; return the page's path."""
+def write_report(directory: Path, legs: Mapping[str, Sequence[Picture]], p_fa: float) -> Path:
+    """Write pictures and `index.html` into a directory; return the page's path. `p_fa` is that of the legs."""
     directory.mkdir(parents=True, exist_ok=True)
     mpl.use("Agg")
     parts = ["<!doctype html><meta charset=utf-8><title>shadebus report</title>", STYLE, "<h1>shadebus report</h1>"]
-    _save(_timeline(legs), directory / "statistic.png")
+    _save(_timeline(legs, p_fa), directory / "statistic.png")
     _save(_histogram(legs), directory / "disparities.png")
     parts.append("<h2>The test statistic against its threshold</h2><img src=statistic.png>")
     parts.append(
@@ -101,7 +103,7 @@ def _polar(
     axes.grid(visible=False)
 
 
-def _timeline(legs: Mapping[str, Sequence[Picture]]) -> Figure:
+def _timeline(legs: Mapping[str, Sequence[Picture]], p_fa: float) -> Figure:
     figure = Figure(figsize=(11, 4.5))
     axes = figure.subplots(1, len(legs), sharey=True, squeeze=False)[0]
     for panel, (title, pictures) in zip(axes, legs.items(), strict=True):
@@ -114,9 +116,10 @@ def _timeline(legs: Mapping[str, Sequence[Picture]]) -> Figure:
                 panel.axvline(time_s, color=colour, alpha=0.3)
             else:
                 panel.plot(time_s, v.q / v.threshold, "o", color=colour)
+                panel.plot(time_s, (v.t_normalised or 0) / threshold(v.n_pairs, p_fa), "x", color="#8899aa")
         panel.axhline(1, color="k", lw=1, ls="--")
-        panel.set(title=title, xlabel="time (s)", ylim=(0, None))
-    axes[0].set_ylabel("statistic over its threshold")
+        panel.set(title=title, xlabel="time (s)")
+    axes[0].set(ylabel="statistic over its threshold", ylim=(0, 1.1 * max(axes[0].get_ylim()[1], 1)))
     axes[0].legend(handles=LEGEND, loc="upper left", fontsize="small")
     return figure
 

@@ -31,12 +31,13 @@ class Service:
         self.broken = threading.Event()  # set when a thread that the gateway cannot do without has died
         self.recording_path: Path | None = None
         self._config = config
+        adapters = [(a.name, make_adapter(a)) for a in config.adapters]
         recorder = self._recorder(monitor)
         limit_bytes = (config.recording.queue_mib if config.recording else 64) << 20
         sync_s = config.recording.sync_interval_s if config.recording else 1.0
         self._to_core = CoreQueue(lambda reason: self._journal.report("core", "BEHIND", reason))
         self._journal = Journal(recorder, self._to_core.deliver, limit_bytes, sync_s)
-        core = Core(lambda: Pipeline(config, monitor, watcher), emit, self._core_failed)
+        core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, self._core_failed)
 
         def core_work() -> None:
             if monitor:
@@ -44,7 +45,7 @@ class Service:
             self._to_core.run(core)
 
         self._supervisors = [
-            Supervisor(a.name, make_adapter(a), self._journal.chunk, self._journal.report) for a in config.adapters
+            Supervisor(name, adapter, self._journal.chunk, self._journal.report) for name, adapter in adapters
         ]
         self._core_thread = self._thread("core", core_work)
         self._journal_thread = self._thread("journal", self._journal.run)

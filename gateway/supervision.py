@@ -3,6 +3,7 @@
 CLOSED -> OPENING -> UP -> LOST -> OPENING ... Every change is a recorded status with its reason.
 """
 
+import contextlib
 import threading
 from collections.abc import Callable
 
@@ -66,7 +67,8 @@ class Supervisor:
         except Exception as error:  # noqa: BLE001 # pyserial alone raises four unrelated kinds on unplugging
             self._state("LOST", _reason(error))
         finally:
-            port.close()
+            with contextlib.suppress(Exception):  # the line is given up, whatever its driver says to that
+                port.close()
 
     def _state(self, state: str, reason: str = "") -> None:
         self._report(self.name, state, reason)

@@ -23,7 +23,7 @@ class Beam(NamedTuple):
 
     width_deg: float = 3.5  # one-way 3 dB
     azimuth_fan: int = 7  # sub-azimuths; 1 is the paper's boresight form
-    azimuth_span: float = 0.75  # beam widths each side: there ground 14 dB over the first level falls below it
+    azimuth_span: float = 0.75  # beam widths each side, where the two-way gain is 13.5 dB down
     refraction_k: float = 4 / 3  # effective Earth radius factor; inf is the paper's flat Earth
     range_reference: str = "centre"  # or "far_edge", the paper's R_j = j dR
 

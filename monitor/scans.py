@@ -45,7 +45,7 @@ class ScanBuilder:
     """Collects radials and gives a scan whenever a sweep has ended."""
 
     def __init__(self) -> None:
-        self._number = 0
+        self.number = 0
         self._rows: list[tuple[int, float, bool, NDArray[np.uint8]]] = []
         self._settings = (0.0, 0.0, 0, False, 0)  # tilt, range, mode, stabilised, bins
         self._direction = 0.0
@@ -93,7 +93,7 @@ class ScanBuilder:
         moving = steps[steps > 0]
         missing = int(np.sum(np.round(moving / np.median(moving)) - 1)) if moving.size else 0
         scan = Scan(
-            self._number,
+            self.number,
             np.array(times, np.int64),
             np.array(angles),
             np.array(limits),
@@ -105,7 +105,7 @@ class ScanBuilder:
             missing,
             int(np.sum(steps == 0)),
         )
-        self._number += 1
+        self.number += 1
         self._rows = []
         self._direction = 0.0
         return scan

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 POLL_S = 0.1
-DRAIN_S = 5.0
+DRAIN_S = 1.0
 
 
 class Closed(Exception):
@@ -75,7 +75,7 @@ class PtyOutlet(_Closing):
                         rest = rest[os.write(self._master, rest) :]
 
     def close(self) -> None:
-        """Wait up to five seconds for the reader to empty the terminal, because closing it discards what is inside."""
+        """Wait up to a second for the reader to empty the terminal, because closing it discards what is inside."""
         if self._closing.is_set():
             return
         self._closing.set()

@@ -25,9 +25,9 @@ def play(
 ) -> Played:
     """Write packets when their device time has come on a monotonic clock, never early; `speed` inf does not wait.
 
-    The clock starts with the first packet. Ends with the traffic, at `stop`, or when the outlet's reader leaves;
-    a write that waits for a slow reader is ended by closing the outlet.
-    Raises ValueError for a speed that is not positive.
+    The clock starts when the first packet has gone out. Ends with the traffic, at `stop`, or when the outlet's reader
+    leaves; a write that waits for a slow reader is ended by closing the outlet. Raises ValueError for a speed that is
+    not positive.
     """
     if not speed > 0:
         raise ValueError(f"speed {speed} must be above 0: 1 is real time, inf does not wait")
@@ -36,14 +36,14 @@ def play(
     origin: float | None = None
     for time_ns, data in traffic:
         due_s = time_ns * 1e-9 / speed
-        if origin is None:
-            origin = time.monotonic() - due_s
-        if halt.wait(max(0.0, origin + due_s - time.monotonic())):
+        if halt.wait(max(0.0, origin + due_s - time.monotonic()) if origin is not None else 0.0):
             break
         try:
             outlet.write(data)
         except Closed:
             break
+        if origin is None:  # only now has a reader come
+            origin = time.monotonic() - due_s
         played.worst_lateness_s = max(played.worst_lateness_s, time.monotonic() - origin - due_s)
         played.packets += 1
         played.size_bytes += len(data)

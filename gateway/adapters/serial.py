@@ -2,6 +2,9 @@
 
 import contextlib
 import errno
+import select
+from queue import Empty
+from typing import Any
 
 import serial
 
@@ -9,29 +12,36 @@ from gateway.config import AdapterConfig
 from gateway.errors import GatewayError
 
 LONGEST_WAIT_S = 0.2  # so that a silent line still notices the order to stop
-SOCKET_WAIT_S = 0.01  # a socket's read waits for its full size, so this is the latency of a trickle
 LARGEST_READ = 65_536
 
 MENDS = {
     errno.ENOENT: "no such device: plug it in, or see `ls /dev/serial/by-id` for its name",
     errno.EACCES: "no permission: add yourself to the dialout group, or see `shadebus doctor`",
     errno.EBUSY: "in use: another program holds the line",
+    errno.EAGAIN: "in use: another program holds the line",
     errno.ENOTTY: "not a serial line",
     errno.ECONNREFUSED: "connection refused: nothing listens at that address",
 }
 
 
 class SerialPort:
-    """An open line. The read idiom depends on the kind: `in_waiting` counts on a device and is useless on a socket."""
+    """An open line.
 
-    def __init__(self, line: serial.Serial, *, is_socket: bool) -> None:
+    pyserial's `read` gathers until it has what was asked for or its time is over, and forgets what it has gathered
+    when the line breaks meanwhile. So we wait ourselves and let it read once, with no time to gather. A telnet line
+    (rfc2217) has nothing to wait on, but a queue of its own that keeps its bytes.
+    """
+
+    def __init__(self, line: serial.Serial, *, telnet: bool) -> None:
         self._line = line
-        self._is_socket = is_socket
+        self._telnet = telnet
 
     def read(self) -> bytes:
         """Whatever has come, up to 64 KiB."""
-        size = LARGEST_READ if self._is_socket else min(self._line.in_waiting or 1, LARGEST_READ)
-        return bytes(self._line.read(size))
+        if self._telnet:
+            return _read_telnet(self._line)
+        ready, _, _ = select.select([self._line], [], [], LONGEST_WAIT_S)
+        return bytes(self._line.read(LARGEST_READ)) if ready else b""
 
     def close(self) -> None:
         """Close the line; an unplugged one may object in many ways, none of which matters any more."""
@@ -48,17 +58,42 @@ class SerialAdapter:
 
     def open(self) -> SerialPort:
         """Open the line for this process alone. Raises GatewayError with the mend."""
-        is_socket = self.address.startswith("socket://")
-        is_device = "://" not in self.address
-        timeout_s = SOCKET_WAIT_S if is_socket else LONGEST_WAIT_S
+        telnet = self.address.startswith("rfc2217://")
+        exclusive = None if "://" in self.address else True
+        timeout_s = LONGEST_WAIT_S if telnet else 0
         try:
             line = serial.serial_for_url(
-                self.address, baudrate=self.baud, timeout=timeout_s, exclusive=is_device or None
+                self.address, do_not_open=True, baudrate=self.baud, timeout=timeout_s, exclusive=exclusive
             )
+            # pyserial throws away what has come while it was opening, and with it a bridge's hello.
+            line.reset_input_buffer = line._reset_input_buffer = _keep  # type: ignore[method-assign, attr-defined]
+            line.open()
         except (OSError, ValueError) as error:
-            number = getattr(error, "errno", None) or getattr(error.__context__, "errno", None)
-            raise GatewayError(f"serial line {self.address}: {MENDS.get(number or 0, error)}") from error
-        return SerialPort(line, is_socket=is_socket)
+            raise GatewayError(f"serial line {self.address}: {MENDS.get(_number(error), error)}") from error
+        return SerialPort(line, telnet=telnet)
+
+
+def _number(error: Exception) -> int:
+    """The errno, which pyserial may have left in what it caught."""
+    causes = (error.args, error.__context__.args if error.__context__ else ())
+    return next((args[0] for args in causes if args and isinstance(args[0], int)), 0)
+
+
+def _read_telnet(line: Any) -> bytes:
+    """What pyserial's thread has queued; its own `read` forgets the queue as soon as the line breaks."""
+    alive = line._thread.is_alive()  # asked before the queue, which this thread fills
+    queue = line._read_buffer
+    try:
+        first = queue.get(timeout=LONGEST_WAIT_S if alive else 0)
+    except Empty:
+        if alive:
+            return b""
+        raise serial.SerialException("the other end has hung up") from None
+    return b"".join(part or b"" for part in (first, *(queue.get() for _ in range(queue.qsize()))))
+
+
+def _keep() -> None:
+    """Leave the input buffer as it is."""
 
 
 def make(address: str, config: AdapterConfig) -> SerialAdapter:

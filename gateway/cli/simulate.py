@@ -1,7 +1,6 @@
 """`shadebus simulate`: a simulated flight as byte-exact bus traffic."""
 
 import signal
-import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -48,14 +47,14 @@ def simulate(
     except (OSError, ValueError, OverflowError) as error:
         raise GatewayError(f"--to {to}: {error}") from error
 
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with outlet:
         try:
-            played = play(traffic(plan), outlet, speed, stop)
+            played = play(traffic(plan), outlet, speed)
         except (OSError, ValueError) as error:
             raise GatewayError(f"simulation: {error}") from error
+        except KeyboardInterrupt:  # the usual end of a simulation, also while it waits for a reader
+            return
     typer.echo(
         f"{played.packets} packets, {played.size_bytes} bytes, at worst {played.worst_lateness_s * 1e3:.1f} ms late",
         err=True,

@@ -211,7 +211,7 @@ def test_words_of_a_wrong_kind_are_refused() -> None:
         with pytest.raises(ValueError, match="32-bit unsigned integers"):
             unpack(words)
     with pytest.raises(ValueError, match="label_swapped"):
-        decode([1], IRU, "swapped")  # type: ignore[arg-type]
+        decode([1], IRU, "swapped")
     with pytest.raises(ValueError, match="toward_zero"):
         join_position([1], [1], "floor")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="2 coarse and 1 fine"):

@@ -269,3 +269,15 @@ def test_a_body_reader_refuses_a_packet_of_another_type(read: object) -> None:
 def test_importing_the_framer_does_not_import_construct_or_numba() -> None:
     code = "import decoders.racklink, sys; sys.exit(bool({'construct', 'numba'} & sys.modules.keys()))"
     assert run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_successor_keeps_the_books_and_counts_what_was_pending_as_skipped() -> None:
+    before, after = Framer(), Framer()
+    before.feed(GOOD_FRAME + b"\7\7\7")
+    after.succeed(before)
+    assert after.feed(GOOD_FRAME) == [GOOD]
+    assert after.counters() == fed([GOOD_FRAME])[1] | {
+        "received": 2 * len(GOOD_FRAME) + 3,
+        "framed": 2 * len(GOOD_FRAME),
+        "skipped": 3,
+    }

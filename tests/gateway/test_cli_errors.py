@@ -1,0 +1,149 @@
+"""A mistake at the command line is one line on stderr that names the thing and the mend, and a non-zero exit."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from mcap.writer import Writer
+
+from gateway.config import check_config
+from gateway.metadata import build_monitor, describe
+from gateway.recording import Recorder
+from simulators.outlets import PtyOutlet
+from tests.gateway.conftest import TERRAIN
+from tests.gateway.shell import shadebus
+
+Arguments = list[str | Path]
+# Nothing is forbidden to root, so the command gives its rights up, once it has loaded what only root may read.
+AS_NOBODY = (
+    sys.executable,
+    "-c",
+    """
+import os
+import gateway.adapters.serial, gateway.console, gateway.metadata, gateway.service
+from gateway.cli import main
+if os.geteuid() == 0:
+    os.setgroups([])
+    os.setgid(65534)
+    os.setuid(65534)
+main()
+""",
+)
+RACK = '[[adapters]]\nname = "bridge"\nsource = "serial:/dev/no-such-line"\n'
+
+
+def rack(directory: Path, text: str) -> Arguments:
+    (directory / "rack.toml").write_text(text)
+    return ["run", "-c", directory / "rack.toml"]
+
+
+def file(directory: Path, content: bytes) -> Path:
+    (directory / "file").write_bytes(content)
+    return directory / "file"
+
+
+def foreign_mcap(directory: Path) -> Path:
+    path = directory / "foreign.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2", library="another")
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
+def without_configuration(directory: Path) -> Path:
+    Recorder(directory / "odd.mcap", {"configuration": "{}"}).close()
+    return directory / "odd.mcap"
+
+
+def without_calibration(directory: Path) -> Path:
+    config = check_config({"adapters": [{"name": "a", "source": "serial:x"}]}, "test")
+    metadata = {key: text for key, text in describe(config, None).items() if key != "calibration"}
+    Recorder(directory / "odd.mcap", metadata).close()
+    return directory / "odd.mcap"
+
+
+def source(*more: str | Path) -> Arguments:
+    return ["run", "--source", "serial:/dev/no-such-line", *more]
+
+
+CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
+    "wrong port": (lambda d: source(), ("/dev/no-such-line", "no such device: plug it in")),
+    "missing terrain": (lambda d: source("--dem", d / "no.tif"), ("no.tif does not exist", "check the path")),
+    "no terrain": (lambda d: source("--dem", file(d, b"text")), ("file cannot be read as terrain", "GeoTIFF")),
+    "no TOML": (lambda d: rack(d, "adapters = ["), ("rack.toml is not TOML",)),
+    "missing rack": (lambda d: ["run", "-c", d / "no.toml"], ("no.toml", "No such file")),
+    "unknown key": (lambda d: rack(d, RACK + "speed = 1"), ("rack.toml: adapters.0.speed", "not permitted")),
+    "bad value": (lambda d: rack(d, RACK + "[monitor]\np_fa = 2"), ("monitor.p_fa", "less than 0.5")),
+    "unknown kind": (lambda d: ["run", "--source", "tin:can"], ("'tin:can': unknown kind 'tin'", "use one of serial")),
+    "no source": (lambda d: ["run"], ("-c", "--source, such as serial:")),
+    "missing recording": (lambda d: ["replay", d / "no.mcap"], ("no.mcap", "No such file")),
+    "no recording": (lambda d: ["replay", file(d, b"text" * 99)], ("file is not a shadebus recording",)),
+    "foreign recording": (lambda d: ["info", foreign_mcap(d)], ("foreign.mcap is an MCAP file, but not a shadebus",)),
+    "odd metadata": (lambda d: ["dump", without_configuration(d)], ("metadata holds no configuration",)),
+    "odd calibration": (lambda d: ["replay", without_calibration(d)], ("metadata holds no calibration",)),
+    "missing calibration": (
+        lambda d: source("--dem", TERRAIN, "--calibration", d / "no.json"),
+        ("calibration file", "no.json cannot be read: No such file"),
+    ),
+    "no calibration": (
+        lambda d: source("--dem", TERRAIN, "--calibration", file(d, b"{}")),
+        ("calibration file", "name: Field required"),
+    ),
+    "bad hexadecimal": (lambda d: ["decode", "429", "12g4"], ("12g4", "is not hexadecimal")),
+    "bad length": (lambda d: ["decode", "708", "b443"], ("2 bytes given, 8 or 200 needed",)),
+    "unknown set": (lambda d: ["decode", "429", "1", "--set", "gps"], ("no definitions 'gps'", "gnss_743a")),
+    "half a configuration": (lambda d: ["thresholds", "--n", "60"], ("give all of --n",)),
+    "unknown outlet": (lambda d: ["simulate", "--to", "tin"], ("--to tin: use pty, tcp:PORT or file:PATH",)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_mistake_is_one_line_that_names_it_and_the_mend(case: str, tmp_path: Path) -> None:
+    arguments, fragments = CASES[case]
+    done = shadebus(*arguments(tmp_path))
+    assert done.returncode == 1
+    complaint, *more = [text for text in done.stderr.splitlines() if not text.startswith("no terrain given")]
+    assert more == []
+    assert complaint.startswith("shadebus: ")
+    assert [fragment for fragment in fragments if fragment not in complaint] == [], complaint
+
+
+def test_a_line_without_permission_is_named_with_the_group_to_join() -> None:
+    with PtyOutlet() as line:
+        Path(line.path).chmod(0)
+        command = [*AS_NOBODY, "run", "--source", f"serial:{line.path}"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert f"{line.path}: no permission: add yourself to the dialout group" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_directory_without_permission_is_named(tmp_path: Path) -> None:
+    with PtyOutlet() as line:
+        done = shadebus("run", "--source", f"serial:{line.path}", "--record", "/proc/no-such-directory")
+    assert done.returncode == 1
+    assert "shadebus: cannot record to /proc/no-such-directory/" in done.stderr
+    assert "choose another directory" in done.stderr
+
+
+def test_terrain_that_changed_since_the_recording_is_named(tmp_path: Path) -> None:
+    dem = tmp_path / TERRAIN.name
+    dem.write_bytes(TERRAIN.read_bytes())
+    config = check_config({"adapters": [{"name": "a", "source": "serial:x"}], "terrain": [dem]}, "test")
+    Recorder(tmp_path / "a.mcap", describe(config, build_monitor(config))).close()
+    content = bytearray(dem.read_bytes())
+    content[1000] ^= 1
+    dem.write_bytes(content)
+    done = shadebus("replay", tmp_path / "a.mcap")
+    assert done.returncode == 1
+    assert f"{dem} changed since the recording was made: name the terrain to use with --dem" in done.stderr
+    assert shadebus("replay", tmp_path / "a.mcap", "--dem", TERRAIN).returncode == 0
+
+
+def test_the_module_and_the_installed_command_are_the_same() -> None:
+    command = Path(sys.executable).with_name("shadebus")
+    done = subprocess.run([command, "decode", "708", "zz"], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (1, shadebus("decode", "708", "zz").stderr)

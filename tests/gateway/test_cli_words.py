@@ -1,0 +1,136 @@
+"""What the small verbs print."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from gateway.cli import app
+from simulators import arinc429
+from tests.gateway.shell import shadebus
+
+HEAVY = ("numpy", "numba", "scipy", "rasterio", "mcap", "matplotlib", "serial", "pydantic")
+VERBS = ("demo", "run", "simulate", "replay", "dump", "info", "thresholds", "doctor", "decode 429", "decode 708")
+
+
+def rows(text: str) -> list[list[str]]:
+    """The cells of a printed table."""
+    return [[cell.strip() for cell in line.strip("│").split("│")] for line in text.splitlines() if line.startswith("│")]
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys\nfrom gateway.cli import app\ntry:\n    app(['--help'])\nexcept SystemExit as done:\n"
+        f"    print('loaded:', sorted({set(HEAVY)!r} & sys.modules.keys()), done.code)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.splitlines()[-1] == "loaded: [] 0"
+    for verb in VERBS:
+        assert verb.split()[0] in done.stdout
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_explains_itself(verb: str) -> None:
+    done = CliRunner().invoke(app, [*verb.split(), "--help"])
+    assert done.exit_code == 0
+    assert "Usage" in done.output
+    assert "--help" in done.output
+
+
+def test_a_radar_header_is_explained_field_by_field() -> None:
+    done = shadebus("decode", "708", "b443047a0e80767c")
+    assert done.returncode == 0
+    found = {row[0]: row[1:] for row in rows(done.stdout)}
+    assert found["label"] == ["0-7", "10110100", "055 octal"]
+    assert found["control_accept"][2] == "both indicators"
+    assert found["slave"][2] == "master"
+    assert found["annunciations"][2] == "weather_alert"
+    assert found["faults"][2] == "cooling"
+    assert found["stabilised"][2] == "on"
+    assert found["mode"][2] == "weather_turbulence"
+    assert found["tilt"] == ["29-35", "1110011", "-3.25 deg"]
+    assert found["gain"][2] == "maximum"
+    assert found["range"] == ["42-47", "100000", "160 NM"]
+    assert found["data_accept"][2] == "any"
+    assert found["scan_angle"] == ["51-62", "111110001110", "-10.020 deg from the nose"]
+    assert "bins" not in found
+
+
+def test_a_whole_radar_word_has_its_bins_counted() -> None:
+    word = "b443047a0e80767c" + "ff" * 3 + "00" * 189
+    (bins,) = [row for row in rows(shadebus("decode", "708", word).stdout) if row[0] == "bins"]
+    assert bins == ["bins", "64-1599", "512 x 3", "level 0: 504, level 7: 8"]
+
+
+def test_arinc_429_words_are_explained_field_by_field() -> None:
+    good, bad = arinc429.encode(0o324, -2.5), arinc429.encode(0o324, -2.5) ^ 1 << 31
+    done = shadebus("decode", "429", f"{good:08x}", f"0x{bad:08X}")
+    assert done.returncode == 0
+    found = rows(done.stdout)
+    names = [row[0] for row in found]
+    assert names == 2 * ["label", "SDI", "data", "SSM", "parity", "value"]
+    first, second = ({row[0]: row[1:] for row in part} for part in (found[:6], found[6:]))
+    assert first["label"][1:] == ["324", "Pitch angle"]
+    assert first["SSM"][1:] == ["11", "NORMAL"]
+    assert first["parity"][2] == "odd, good"
+    value, units = first["value"][1].split()
+    assert float(value) == pytest.approx(-2.5, abs=0.01)
+    assert units == "deg"
+    assert "BAD" in second["parity"][2]
+    assert second["value"][1:] == ["none", "BAD_PARITY"]
+
+
+def test_a_label_that_the_set_does_not_have_is_said_to_be_unknown() -> None:
+    found = {row[0]: row[1:] for row in rows(shadebus("decode", "429", "0", "--set", "ra_707").stdout)}
+    assert found["label"][2] == "not in ra_707"
+    assert found["value"][1] == "none"
+
+
+def test_thresholds_are_those_of_the_published_table() -> None:
+    found = rows(shadebus("thresholds").stdout)
+    assert found == [
+        ["60", "2", "1e-01", "1e-05", "74.40", "3.53"],
+        ["60", "2", "1e-03", "1e-03", "99.61", "3.70"],
+        ["60", "2", "1e-05", "1e-01", "118.58", "3.38"],
+        ["120", "4", "1e-01", "1e-05", "140.23", "5.64"],
+        ["120", "4", "1e-03", "1e-03", "173.62", "5.92"],
+        ["120", "4", "1e-05", "1e-01", "197.83", "5.43"],
+    ]
+
+
+def test_thresholds_of_ones_own_configuration() -> None:
+    done = shadebus("thresholds", "--n", "60", "--n", "120", "--sigma-c", "2", "--p-fa", "1e-3", "--p-md", "1e-3")
+    found = rows(done.stdout)
+    assert [row[0] for row in found] == ["60", "120"]
+    assert found[0][4:] == ["99.61", "3.70"]
+
+
+def test_doctor_looks_at_everything_and_its_exit_code_is_its_finding(tmp_path: Path) -> None:
+    done = shadebus("doctor", "--record", tmp_path)
+    found = {row[0]: row[1:] for row in rows(done.stdout)}
+    assert [*found] == [
+        "Python",
+        "libraries",
+        "kernel cache",
+        "serial lines",
+        "serial permission",
+        "disk room",
+        "disk writes",
+        "clock",
+    ]
+    lacking = [name for name, (mark, *_) in found.items() if mark == "lacks"]
+    assert done.returncode == (1 if lacking else 0)
+    assert all(found[name][2] for name in lacking)
+    assert all(not mend for mark, _, mend in found.values() if mark == "good")
+    assert re.fullmatch(r"\d+\.\d+\.\d+.*", found["Python"][1])
+
+
+def test_doctor_names_a_directory_that_takes_no_recording() -> None:
+    done = shadebus("doctor", "--record", "/proc")
+    found = {row[0]: row[1:] for row in rows(done.stdout)}
+    assert found["disk writes"][0] == "lacks"
+    assert "choose a directory you can write" in found["disk writes"][2]
+    assert done.returncode == 1

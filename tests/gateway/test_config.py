@@ -1,0 +1,95 @@
+"""A rack file is checked as a whole before anything opens, and errors say where and what."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.config import RackConfig, check_config, load_config
+from gateway.errors import GatewayError
+from gateway.metadata import describe, recorded_config
+
+ADAPTER = '[[adapters]]\nname = "bridge"\nsource = "serial:/dev/x"\n'
+
+
+def load(tmp_path: Path, text: str) -> RackConfig:
+    (tmp_path / "rack.toml").write_text(text)
+    return load_config(tmp_path / "rack.toml")
+
+
+def test_a_small_rack_file_is_enough(tmp_path: Path) -> None:
+    config = load(tmp_path, ADAPTER)
+    assert config.adapters[0].baud == 921_600
+    assert config.recording is None
+    assert config.terrain == ()
+
+
+def test_paths_count_from_where_the_rack_file_lies(tmp_path: Path) -> None:
+    text = f'terrain = ["a.hgt", "/b.hgt"]\ncalibration = "c.json"\n{ADAPTER}[recording]\ndirectory = "d"\n'
+    config = load(tmp_path, text)
+    assert config.terrain == (tmp_path / "a.hgt", Path("/b.hgt"))
+    assert config.calibration == tmp_path / "c.json"
+    assert config.recording is not None
+    assert config.recording.directory == tmp_path / "d"
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        ("", "adapters: Field required"),
+        ("adapters = []", "adapters: name at least one"),
+        (ADAPTER + "speed = 9600", "adapters.0.speed: Extra inputs"),
+        (ADAPTER + "baud = 10", "adapters.0.baud: .*300"),
+        (ADAPTER.replace("serial:", "serial"), "adapters.0.source"),
+        (ADAPTER.replace("bridge", "a/b"), "adapters.0.name"),
+        (ADAPTER + '[adapters.channels.1]\nkind = "can"', r"adapters.0.channels.1.kind: .*'arinc429' or 'arinc708'"),
+        (
+            ADAPTER + '[adapters.channels.1]\nkind = "arinc429"\ndefinitions = "gps"',
+            "definitions: no definitions 'gps'",
+        ),
+        (
+            ADAPTER + '[adapters.channels.1]\nkind = "arinc429"\ndefinitions = "no.toml"',
+            "no.toml cannot be read: No such",
+        ),
+        (ADAPTER + '[adapters.channels.0]\nkind = "arinc708"\nprofile = "x"', "profile: no profile 'x': use one of"),
+        ('radar_profile = "x"\n' + ADAPTER, "radar_profile: no profile 'x': use one of"),
+        (ADAPTER + "[recording]\nsync_interval_s = 0", "recording.sync_interval_s: .*greater than 0"),
+        (ADAPTER + "[monitor]\np_fa = 0.7", "monitor.p_fa: .*less than 0.5"),
+        (ADAPTER + "[monitr]\np_fa = 0.1", "monitr: Extra inputs"),
+        (ADAPTER + ADAPTER, "two adapters are named 'bridge'"),
+        ("adapters = [", "is not TOML"),
+    ],
+)
+def test_a_mistake_is_named_with_file_and_key(tmp_path: Path, text: str, where: str) -> None:
+    with pytest.raises(GatewayError, match=where) as caught:
+        load(tmp_path, text)
+    assert str(tmp_path / "rack.toml") in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_one_mistake_in_an_adapter_is_one_complaint(tmp_path: Path) -> None:
+    with pytest.raises(GatewayError) as caught:
+        load(tmp_path, ADAPTER + "baud = 10")
+    assert ";" not in str(caught.value)
+
+
+def test_a_rack_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(GatewayError, match=r"cannot read configuration .*none.toml: No such file"):
+        load_config(tmp_path / "none.toml")
+
+
+def test_a_rack_file_that_is_no_text_is_named(tmp_path: Path) -> None:
+    (tmp_path / "rack.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(GatewayError, match=r"rack.toml is not TOML"):
+        load_config(tmp_path / "rack.toml")
+
+
+def test_a_configuration_survives_the_recording_that_holds_it() -> None:
+    config = check_config(
+        {
+            "adapters": [{"name": "a", "source": "serial:x", "channels": {"3": {"kind": "arinc708"}}}],
+            "terrain": ["/t.hgt"],
+            "monitor": {"refraction_k": float("inf"), "p_fa": 1e-3},
+        },
+        "test",
+    )
+    assert recorded_config(describe(config, None)) == config

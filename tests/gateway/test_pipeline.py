@@ -1,0 +1,255 @@
+"""From records to events: what is used, what is refused and counted, and what is said of silence and loss."""
+
+from collections.abc import Iterable
+from typing import TypeVar
+
+import numpy as np
+import pytest
+
+from decoders import formats as f
+from gateway.config import RackConfig, check_config
+from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
+from gateway.pipeline import Pipeline
+from gateway.records import Note, Record
+from monitor.integrity import Monitor
+from monitor.terrain import open_terrain
+from simulators import arinc429, arinc708
+from tests.gateway.conftest import TERRAIN
+from tests.gateway.made import GNSS, IRU, RADAR, Bridge, raw, stamp, status, tick
+
+E = TypeVar("E", bound=Event)
+RACK = check_config({"adapters": [{"name": "bridge", "source": "serial:x"}]}, "test")
+BINS = np.tile(np.arange(512) // 16 % 2, 1)
+
+
+@pytest.fixture(scope="module")
+def monitor() -> Monitor:
+    return Monitor(open_terrain(TERRAIN))
+
+
+def feed(pipeline: Pipeline, *records: Record) -> list[Event]:
+    return [event for record in records for event in pipeline.feed(record)]
+
+
+def only(kind: type[E], events: Iterable[Event]) -> list[E]:
+    return [event for event in events if isinstance(event, kind)]
+
+
+def counters(pipeline: Pipeline) -> dict[str, int]:
+    (summary,) = only(SummaryEvent, pipeline.finish())
+    return summary.counters
+
+
+def position(latitude: float = 44.4, longitude: float = -71.7, ssm: int = 3) -> list[int]:
+    words = []
+    for coarse, fine, degrees in ((0o110, 0o120, latitude), (0o111, 0o121, longitude)):
+        words += [int(word[0]) for word in arinc429.encode_position(coarse, fine, [degrees], ssm=ssm)]
+    return words
+
+
+def radial(angle_deg: float, **changes: float) -> bytes:
+    return arinc708.encode(BINS, scan_angle_deg=angle_deg, tilt_deg=-2.0, range_nm=10.0)
+
+
+def sweep(bridge: Bridge, start_s: float, turn: bool = True) -> bytes:
+    """Ten radials to the right, and one back at the left that ends the sweep."""
+    angles = [*range(-15, 15, 3), *([-15] if turn else [])]
+    return b"".join(bridge.radar(start_s + 0.05 * k, radial(angle)) for k, angle in enumerate(angles))
+
+
+def test_statuses_and_notes_become_events_of_their_record() -> None:
+    events = feed(Pipeline(RACK, None), status(4, 1.5, "LOST", "why"), Note(5, stamp(2), "stepped"))
+    assert events == [
+        StatusEvent(stamp(1.5).utc_ns, 4, "bridge", "LOST", "why"),
+        StatusEvent(stamp(2).utc_ns, 5, "host", "NOTE", "stepped"),
+    ]
+
+
+def test_a_sweep_becomes_a_scan_of_the_record_that_ended_it() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    events = feed(pipeline, raw(1, 0, bridge.hello()), raw(2, 0.5, sweep(bridge, 0, turn=False)))
+    assert events == []
+    (scan,) = feed(pipeline, raw(3, 0.6, bridge.radar(0.55, radial(-15))))
+    assert scan == ScanEvent(
+        stamp(0.6).utc_ns,
+        3,
+        scan=0,
+        radials=10,
+        sector_deg=(pytest.approx(-15, abs=0.05), pytest.approx(12, abs=0.05)),  # type: ignore[arg-type]
+        range_nm=10.0,
+        tilt_deg=-2.0,
+        gaps=0,
+        repeated=0,
+    )
+
+
+def test_the_open_sweep_is_given_at_the_end_with_the_summary() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    feed(pipeline, raw(1, 0, bridge.hello() + sweep(bridge, 0, turn=False)))
+    scan, summary = pipeline.finish()
+    assert isinstance(scan, ScanEvent)
+    assert isinstance(summary, SummaryEvent)
+    assert summary.counters["bridge.words_708"] == 10
+
+
+def test_nothing_recorded_gives_nothing() -> None:
+    assert list(Pipeline(RACK, None).finish()) == []
+
+
+@pytest.mark.parametrize("flag", [f.FLAG_CODING, f.FLAG_WORD_LENGTH, f.FLAG_SYNC])
+def test_words_whose_bits_cannot_be_trusted_are_refused_and_counted(flag: int) -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    spoilt = bridge.words(GNSS, 0.1, position(), flag) + bridge.radar(0.2, radial(0), flag)
+    events = feed(pipeline, raw(1, 0, bridge.hello() + spoilt), tick(2, 0.3))
+    assert only(StateEvent, events)[0].validity["latitude_deg"] == "MISSING"
+    found = counters(pipeline)
+    assert (found["bridge.words_429_unused"], found["bridge.words_708_unused"]) == (4, 1)
+
+
+@pytest.mark.parametrize("flag", [0, f.FLAG_PARITY, f.FLAG_FIFO_OVERFLOW])
+def test_words_with_other_flags_are_used(flag: int) -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    words = b"".join(bridge.words(GNSS, 0.2 * k, position(), flag) for k in range(2))
+    (state,) = only(StateEvent, feed(pipeline, raw(1, 0, bridge.hello() + words), tick(2, 0.3)))
+    assert state.validity["latitude_deg"] == "NORMAL"
+    assert state.values["latitude_deg"] == pytest.approx(44.4, abs=1e-6)
+    assert state.values["longitude_deg"] == pytest.approx(-71.7, abs=1e-6)
+
+
+def test_unknown_packet_types_and_versions_are_counted() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    assert feed(pipeline, raw(1, 0, bridge.packet(0x7F, 0, 0, b"new") + bridge.heartbeat(1))) == []
+    found = counters(pipeline)
+    assert (found["bridge.packets"], found["bridge.packets_of_unknown_type"]) == (2, 1)
+
+
+def test_malformed_bodies_are_counted_and_cost_no_neighbour() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    malformed = (
+        bridge.packet(f.HELLO, 0, 0, b"abc")
+        + bridge.packet(f.HEARTBEAT, 0, 0, b"abc")
+        + bridge.packet(f.WORD_708, RADAR, 0, b"\x40\x06short")
+        + bridge.packet(f.WORDS_429, GNSS, 0, b"\0" * 11)
+        + bridge.packet(f.WORD_708, RADAR, 2**64 / 1e9 - 1e4, b"\0\0")
+    )
+    feed(pipeline, raw(1, 0, bridge.hello() + malformed + bridge.radar(0.1, radial(0))))
+    found = counters(pipeline)
+    assert found["bridge.malformed_bodies"] == 5
+    assert found["bridge.words_708"] == 1
+
+
+def test_a_radar_word_of_another_length_is_counted_and_not_used() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    short = bridge.packet(f.WORD_708, RADAR, 0, (800).to_bytes(2, "little") + bytes(100))
+    feed(pipeline, raw(1, 0, bridge.hello() + short))
+    assert counters(pipeline)["bridge.words_708_unused"] == 1
+
+
+def test_a_chunk_of_an_adapter_that_is_not_configured_is_counted() -> None:
+    pipeline = Pipeline(RACK, None)
+    feed(pipeline, raw(1, 0, b"x", adapter="other"))
+    assert counters(pipeline)["chunks_of_unknown_adapter"] == 1
+
+
+def test_words_of_a_channel_that_nobody_named_are_counted_and_told_once() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    words = [raw(k, k / 10, bridge.words(9, k / 10, position())) for k in range(3)]
+    told = only(StatusEvent, feed(pipeline, *words))
+    assert [(event.state, event.sequence) for event in told] == [("UNKNOWN_CHANNEL", 0)]
+    assert "channel 9" in told[0].reason
+    assert counters(pipeline)["bridge.words_429_unused"] == 12
+
+
+def test_a_gnss_without_computed_data_says_so_and_gives_no_value() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    words = b"".join(bridge.words(GNSS, 0.2 * k, position(ssm=1)) for k in range(3))
+    (state,) = only(StateEvent, feed(pipeline, raw(1, 0, bridge.hello() + words), tick(2, 0.5)))
+    assert state.values["latitude_deg"] is None
+    assert state.validity["latitude_deg"] == "NO_COMPUTED_DATA"
+    assert counters(pipeline)["bridge.words_429_no_computed_data"] == 12
+
+
+def test_a_scan_without_gnss_is_unavailable_and_the_reason_names_what_is_missing(monitor: Monitor) -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, monitor)
+    words = b"".join(bridge.words(GNSS, 0.2 * k, position(ssm=1)) for k in range(5))
+    events = feed(pipeline, raw(1, 0, bridge.hello() + words + sweep(bridge, 0.1)))
+    (verdict,) = only(IntegrityEvent, events)
+    assert verdict.verdict == "unavailable"
+    assert any("latitude_deg: NO_COMPUTED_DATA" in reason for reason in verdict.reasons)
+    assert any("pitch_deg: MISSING" in reason for reason in verdict.reasons)
+    assert verdict.q is None
+
+
+def test_losses_appear_in_the_next_verdict_and_in_no_other(monitor: Monitor) -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, monitor)
+    feed(pipeline, raw(1, 0, bridge.hello(), dropped=17), status(2, 0.1, "LOST", "unplugged"))
+    bridge.sequence += 5
+    first = feed(pipeline, raw(3, 0.5, sweep(bridge, 0)))
+    second = feed(pipeline, raw(4, 1.5, sweep(bridge, 1)))
+    (verdict,) = only(IntegrityEvent, first)
+    assert [reason for reason in verdict.reasons if "degraded" in reason] == [
+        "degraded: bridge LOST: unplugged",
+        "degraded: bridge: 17 bytes dropped",
+        "degraded: bridge: 5 packets lost",
+    ]
+    assert not [reason for event in only(IntegrityEvent, second) for reason in event.reasons if "degraded" in reason]
+
+
+def test_a_source_that_falls_quiet_is_told_once_and_again_when_it_is_heard() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    feed(pipeline, raw(1, 0, bridge.heartbeat(0)))
+    events = feed(pipeline, *(tick(k + 2, k + 1.0) for k in range(8)), raw(20, 9.5, bridge.heartbeat(9)))
+    told = [(event.state, event.sequence, event.reason) for event in only(StatusEvent, events)]
+    assert told == [("QUIET", 7, "no words for 6.0 s"), ("HEARD", 20, "words come again")]
+
+
+def test_a_source_that_was_opened_and_never_heard_is_told_to_be_quiet() -> None:
+    pipeline = Pipeline(RACK, None)
+    events = feed(pipeline, status(0, 0, "UP"), *(tick(k, k) for k in range(1, 9)))
+    assert [event.adapter for event in only(StatusEvent, events) if event.state == "QUIET"] == ["bridge"]
+
+
+def test_a_silent_radar_ends_its_sweep_and_gives_an_unavailable_verdict(monitor: Monitor) -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, monitor)
+    feed(pipeline, raw(1, 0, bridge.hello() + sweep(bridge, 0, turn=False)))
+    events: list[Event] = []
+    for second in range(1, 8):
+        events += feed(pipeline, raw(2 * second, second, bridge.heartbeat(second)), tick(2 * second + 1, second + 0.1))
+    assert [event.adapter for event in only(StatusEvent, events)] == ["radar"]
+    assert len(only(ScanEvent, events)) == 1
+    _, silence = only(IntegrityEvent, events)
+    assert silence.verdict == "unavailable"
+    assert any("no words for" in reason for reason in silence.reasons)
+
+
+def test_the_state_grows_old_when_words_stop_though_the_bridge_still_beats() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    words = b"".join(bridge.words(GNSS, 0.2 * k, position()) for k in range(5))
+    feed(pipeline, raw(1, 1, bridge.hello() + words))
+    events: list[Event] = []
+    for second in range(2, 9):
+        events += feed(pipeline, raw(2 * second, second, bridge.heartbeat(second)), tick(2 * second + 1, second + 0.1))
+    states = only(StateEvent, events)
+    assert states[0].validity["latitude_deg"] == "NORMAL"
+    assert states[-1].validity["latitude_deg"] == "STALE"
+    ages = [state.age_s["latitude_deg"] for state in states]
+    assert ages == [pytest.approx(1.1 + k, abs=0.01) for k in range(7)]
+
+
+def test_inertial_words_give_attitude_in_degrees() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    words = [arinc429.encode(0o324, -2.5), arinc429.encode(0o325, 10.0), arinc429.encode(0o314, 197.6 - 360)]
+    data = b"".join(bridge.words(IRU, 0.02 * k, words) for k in range(3))
+    (state,) = only(StateEvent, feed(pipeline, raw(1, 0, bridge.hello() + data), tick(2, 0.05)))
+    found = [state.values[name] for name in ("pitch_deg", "roll_deg", "heading_deg")]
+    assert found == [pytest.approx(value, abs=0.01) for value in (-2.5, 10.0, -162.4)]
+
+
+def test_channels_of_the_configuration_need_no_hello() -> None:
+    channels = {"1": {"kind": "arinc429", "definitions": "gnss_743a"}, "0": {"kind": "arinc708"}}
+    rack = RackConfig.model_validate({"adapters": [{"name": "bridge", "source": "serial:x", "channels": channels}]})
+    bridge, pipeline = Bridge(), Pipeline(rack, None)
+    words = b"".join(bridge.words(GNSS, 0.2 * k, position()) for k in range(2))
+    events = feed(pipeline, raw(1, 0, words + sweep(bridge, 0)), tick(2, 0.3))
+    assert only(StateEvent, events)[0].validity["latitude_deg"] == "NORMAL"
+    assert len(only(ScanEvent, events)) == 1

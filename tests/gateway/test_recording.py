@@ -1,0 +1,158 @@
+"""A recording holds what was appended, whatever happens to its end."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from gateway.errors import GatewayError
+from gateway.recording import Recorder, Recording
+from gateway.records import Raw, Record
+from tests.gateway.made import raw, some_records, status, tick
+
+METADATA = {"configuration": "{}", "host": "here"}
+
+
+@pytest.fixture
+def closed(tmp_path: Path) -> Path:
+    """A small recording that was closed."""
+    path = tmp_path / "closed.mcap"
+    recorder = Recorder(path, METADATA)
+    for record in some_records():
+        recorder.append([record])
+    recorder.close()
+    return path
+
+
+def changed(path: Path, data: bytes) -> Recording:
+    path.write_bytes(data)
+    return Recording(path)
+
+
+def test_a_closed_recording_gives_every_record_in_order(closed: Path) -> None:
+    recording = Recording(closed)
+    assert list(recording) == some_records()
+    assert recording.metadata == METADATA
+    assert (recording.records, recording.damaged, recording.torn) == (6, 0, "")
+
+
+def test_a_recording_can_be_read_again(closed: Path) -> None:
+    recording = Recording(closed)
+    assert list(recording) == list(recording)
+    assert recording.records == 6
+
+
+def test_what_append_returned_for_is_on_disk_without_close(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "open.mcap", METADATA)
+    kept: list[Record] = []
+    for k in range(500):
+        batch: list[Record] = [raw(2 * k, k, bytes(97)), tick(2 * k + 1, k)]
+        recorder.append(batch)
+        kept += batch
+        if k % 100 == 0:
+            recording = Recording(tmp_path / "open.mcap")
+            assert list(recording) == kept
+            assert recording.torn
+    assert list(Recording(tmp_path / "open.mcap")) == kept
+    recorder.close()
+    assert list(Recording(tmp_path / "open.mcap")) == kept
+
+
+def test_any_mcap_tool_opens_a_closed_recording(closed: Path) -> None:
+    with closed.open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        messages = [(channel.topic, message.data) for _, channel, message in reader.iter_messages()]
+    assert summary is not None and summary.statistics is not None
+    assert {channel.topic for channel in summary.channels.values()} == {
+        "/status",
+        "/raw/bridge",
+        "/raw/left-2",
+        "/note",
+        "/tick",
+    }
+    assert summary.statistics.message_count == len(messages) == 6
+
+
+def test_a_recording_torn_anywhere_gives_a_prefix_and_says_so(closed: Path, tmp_path: Path) -> None:
+    data = closed.read_bytes()
+    counts: list[int] = []
+    for size in range(len(data)):
+        try:
+            recording = changed(tmp_path / "torn.mcap", data[:size])
+        except GatewayError as error:
+            assert "is not a shadebus recording" in str(error)
+            assert not counts, "a longer piece was readable before"
+            continue
+        found = list(recording)
+        assert found == some_records()[: len(found)]
+        assert recording.records == len(found)
+        assert recording.torn, f"{size} of {len(data)} bytes"
+        assert recording.damaged == 0
+        counts.append(len(found))
+    assert counts == sorted(counts)
+    assert set(counts) == set(range(7))
+
+
+def test_a_byte_changed_anywhere_never_breaks_the_reading(closed: Path, tmp_path: Path) -> None:
+    data = closed.read_bytes()
+    whole = some_records()
+    for place in range(len(data)):
+        for flip in (0x01, 0xFF):
+            damaged = bytearray(data)
+            damaged[place] ^= flip
+            try:
+                found = list(changed(tmp_path / "damaged.mcap", bytes(damaged)))
+            except GatewayError:
+                continue
+            raws = [record for record in found if isinstance(record, Raw)]
+            assert {record.data for record in raws} <= {record.data for record in whole if isinstance(record, Raw)}
+
+
+def test_a_changed_byte_in_a_raw_chunk_costs_that_record_and_is_counted(closed: Path, tmp_path: Path) -> None:
+    data = bytearray(closed.read_bytes())
+    data[data.index(bytes(range(256))) + 7] ^= 1
+    recording = changed(tmp_path / "damaged.mcap", bytes(data))
+    assert list(recording) == [record for record in some_records() if record.sequence != 1]
+    assert (recording.records, recording.damaged, recording.torn) == (5, 1, "")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda path: None, "cannot read recording .*: No such file"),
+        (lambda path: path.mkdir(), "cannot read recording .*: Is a directory"),
+        (lambda path: path.write_bytes(b""), "is not a shadebus recording: it is too short"),
+        (lambda path: path.write_text("hello, this is text\n" * 50), "is not a shadebus recording"),
+        (lambda path: path.write_bytes(bytes(1000)), "is not a shadebus recording"),
+    ],
+)
+def test_what_is_no_recording_is_named(tmp_path: Path, make: Callable[[Path], object], message: str) -> None:
+    path = tmp_path / "what.mcap"
+    make(path)
+    with pytest.raises(GatewayError, match=message) as caught:
+        Recording(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_recording_is_never_written_over(closed: Path) -> None:
+    before = closed.read_bytes()
+    with pytest.raises(GatewayError, match="File exists"):
+        Recorder(closed, METADATA)
+    assert closed.read_bytes() == before
+
+
+def test_a_directory_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(GatewayError, match=r"cannot record to .*file.*; choose another directory"):
+        Recorder(tmp_path / "file" / "a.mcap", METADATA)
+
+
+def test_an_abandoned_recording_keeps_what_it_accepted(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.mcap", METADATA)
+    recorder.append([status(0, 0, "UP")])
+    recorder.abandon()
+    recording = Recording(tmp_path / "a.mcap")
+    assert list(recording) == [status(0, 0, "UP")]
+    assert recording.torn
