@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from decoders import formats as f
 from decoders.definitions import Definitions, for_equipment, load_definitions
@@ -26,12 +27,18 @@ class Channel429:
     definitions: Definitions
     orientation: str
 
+    @property
+    def role(self) -> str:
+        """What only one channel can be at a time."""
+        return f"source of equipment {self.equipment:02X}"
+
 
 @dataclass(frozen=True)
 class Channel708:
     """An ARINC 708 channel."""
 
     profile: str
+    role: ClassVar[str] = "radar"
 
 
 @dataclass
@@ -42,7 +49,6 @@ class Link:
     radar_profile: str
     framer: Framer = field(default_factory=Framer)
     counters: Counter[str] = field(default_factory=Counter)
-    unknown: set[int] = field(default_factory=set)  # channels whose words nobody can read, and that have been told
     losses: Counter[str] = field(default_factory=Counter)  # since the last verdict
     channels: dict[int, Channel429 | Channel708] = field(default_factory=dict)
     _next_sequence: int | None = None

@@ -4,7 +4,7 @@ Reads no clock: whatever depends on time depends on the stamps of the records, t
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -55,6 +55,8 @@ class Pipeline:
         self._now_host_ns: int | None = None  # and when that word was read
         self._heard: dict[str, int] = {}  # adapter -> monotonic time of its last chunk
         self._quiet: set[str] = set()
+        self._users: dict[str, tuple[str, int]] = {}  # which adapter's channel gives each role
+        self._unused: set[tuple[str, int]] = set()  # channels not used, told already
         self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
         self._scan_number = 0
         self._last: Record | None = None
@@ -127,22 +129,34 @@ class Pipeline:
         elif packet.type != f.TIME_MARK:
             link.counters["packets_of_unknown_type"] += 1
 
-    def _unknown(
-        self, link: Link, packet: Packet, channel: Channel429 | Channel708 | None, record: Raw
-    ) -> Iterator[Event]:
-        """Say once that a channel carries words of which neither hello nor configuration says what they are."""
-        if channel is None and packet.channel not in link.unknown:
-            link.unknown.add(packet.channel)
-            reason = f"channel {packet.channel} is recorded but not used until a hello or [adapters.channels] names it"
-            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "UNKNOWN_CHANNEL", reason)
+    def _channel(
+        self, link: Link, packet: Packet, record: Raw
+    ) -> Generator[Event, None, Channel429 | Channel708 | None]:
+        """What the packet's channel carries; None if it cannot be used, which is said once.
+
+        Two IRUs, or two radars, are never mixed: the first channel heard of each kind is used.
+        """
+        here = (record.adapter, packet.channel)
+        channel = link.channels.get(packet.channel)
+        if channel is None:
+            reason = "until a hello or [adapters.channels] says what it carries"
+        elif self._users.setdefault(channel.role, here) != here:
+            adapter, number = self._users[channel.role]
+            reason = f"because channel {number} of {adapter} is the {channel.role} in use"
+        else:
+            return channel
+        if here not in self._unused:
+            self._unused.add(here)
+            reason = f"channel {packet.channel} is recorded but not used {reason}"
+            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "UNUSED_CHANNEL", reason)
+        return None
 
     def _words(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         block = words429(packet)
         link.counters["words_429"] += len(block.words)
         if not block.well_formed:
             link.counters["malformed_bodies"] += 1
-        channel = link.channels.get(packet.channel)
-        yield from self._unknown(link, packet, channel, record)
+        channel = yield from self._channel(link, packet, record)
         if not isinstance(channel, Channel429) or packet.flags & SPOILT or not len(block.words):
             link.counters["words_429_unused"] += len(block.words)
             return
@@ -157,8 +171,7 @@ class Pipeline:
     def _radar(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         word = radar_word(packet)
         link.counters["words_708"] += 1
-        channel = link.channels.get(packet.channel)
-        yield from self._unknown(link, packet, channel, record)
+        channel = yield from self._channel(link, packet, record)
         if not isinstance(channel, Channel708) or packet.flags & SPOILT or word.bit_count != f.WORD_708_BITS:
             link.counters["words_708_unused"] += 1
             return

@@ -72,11 +72,6 @@ class ScanBuilder:
         if self._rows:
             yield self._close()
 
-    def expire(self, now_ns: int) -> Iterator[Scan]:
-        """Give the open sweep once nothing has come for a while."""
-        if self._rows and now_ns - self._rows[-1][0] > SILENCE_NS:
-            yield self._close()
-
     def _turns(self, time_ns: int, angle_deg: float) -> bool:
         last_ns, last_deg = self._rows[-1][:2]
         step = (angle_deg - last_deg + 180) % 360 - 180

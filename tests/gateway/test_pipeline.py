@@ -13,7 +13,7 @@ from gateway.pipeline import Pipeline
 from gateway.records import Note, Record
 from monitor.integrity import Monitor
 from monitor.terrain import open_terrain
-from simulators import arinc429, arinc708
+from simulators import arinc429, arinc708, racklink
 from tests.gateway.conftest import TERRAIN
 from tests.gateway.made import GNSS, IRU, RADAR, Bridge, raw, stamp, status, tick
 
@@ -155,9 +155,21 @@ def test_words_of_a_channel_that_nobody_named_are_counted_and_told_once() -> Non
     bridge, pipeline = Bridge(), Pipeline(RACK, None)
     words = [raw(k, k / 10, bridge.words(9, k / 10, position())) for k in range(3)]
     told = only(StatusEvent, feed(pipeline, *words))
-    assert [(event.state, event.sequence) for event in told] == [("UNKNOWN_CHANNEL", 0)]
+    assert [(event.state, event.sequence) for event in told] == [("UNUSED_CHANNEL", 0)]
     assert "channel 9" in told[0].reason
     assert counters(pipeline)["bridge.words_429_unused"] == 12
+
+
+def test_a_second_radar_is_recorded_and_told_but_never_mixed_with_the_first() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    other = RADAR + 7
+    said = bridge.hello() + bridge.hello(body=racklink.hello(1, 1, [(other, f.KIND_708, 0, 0)]))
+    word = bridge.radar(0.1, radial(0))
+    stream = said + word + bridge.packet(f.WORD_708, other, 0.2, racklink.word_708(radial(0)))
+    (told,) = only(StatusEvent, feed(pipeline, raw(0, 0, stream)))
+    assert told.state == "UNUSED_CHANNEL"
+    assert "the radar in use" in told.reason
+    assert counters(pipeline)["bridge.words_708_unused"] == 1
 
 
 def test_a_gnss_without_computed_data_says_so_and_gives_no_value() -> None:

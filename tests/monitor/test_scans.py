@@ -146,16 +146,8 @@ def test_a_clock_that_steps_back_ends_the_sweep() -> None:
     assert sectors(sweeps.feed(radials([6, 9])).finish()) == [(0, 3), (6, 9)]
 
 
-def test_an_open_sweep_is_given_once_nothing_has_come_for_two_seconds() -> None:
-    sweeps = Sweeps().feed(radials([0, 3]))
-    assert not list(sweeps.builder.expire(2020 * MS))
-    assert sectors(list(sweeps.builder.expire(2021 * MS))) == [(0, 3)]
-    assert not list(sweeps.builder.expire(9000 * MS))
-
-
 def test_nothing_fed_is_no_scan() -> None:
     assert not list(ScanBuilder().finish())
-    assert not list(ScanBuilder().expire(9000 * MS))
 
 
 def test_blocks_of_any_size_give_the_same_scans() -> None:
