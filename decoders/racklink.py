@@ -7,6 +7,7 @@ body is not what its type says, so that the caller can count it; its bytes stay 
 import re
 import struct
 import zlib
+from itertools import islice
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from decoders import formats as f
 
 HEADER: Final = struct.Struct(f.LINK_HEADER)
 PACKET_START: Final = re.compile(rb"(?=[\x03-\xff]\x01)")  # a COBS code that spans the version, 1, and a type
+MOST_STARTS: Final = 256  # of a run; noise has 16 in 4 kB, and a hostile sender shall not keep us busy
 CRC: Final = struct.Struct("<I")
 ENTRY_429: Final = np.dtype([("offset_ns", "<u4"), ("word", "<u4")])
 TIME_LIMIT_NS: Final = 2**63 - 2**32  # a device time above it, 292 years, would overflow once an offset is added
@@ -152,7 +154,7 @@ class Framer:
         whole = None if overlong else _unstuffed(run)
         if isinstance(whole, Packet) or whole == "unknown_version":
             return self._account(whole, len(run) + 1)
-        for start in PACKET_START.finditer(run, 0 if overlong else 1):
+        for start in islice(PACKET_START.finditer(run, 0 if overlong else 1), MOST_STARTS):
             packet = _unstuffed(run[start.start() :])
             if isinstance(packet, Packet):
                 self._account(whole, start.start())

@@ -67,7 +67,7 @@ class RackConfig(_Section):
     adapters: tuple[AdapterConfig, ...]
     recording: RecordingConfig | None = None
     terrain: tuple[Path, ...] = Field((), description="GeoTIFF, HGT or DTED files")
-    calibration: Path | None = Field(None, description="made by `shadebus calibrate`; stated defaults without")
+    calibration: Path | None = Field(None, description="calibration file of the radar; stated defaults without")
     radar_profile: ProfileName = Field("arinc708", description="ARINC 708 profile of radar channels that name none")
     monitor: MonitorSettings = MonitorSettings()
     wait_for_devices: bool = Field(False, description="start although a device is not there yet, and keep trying")

@@ -25,7 +25,7 @@ def describe(event: Event) -> str:
     if isinstance(event, StatusEvent):
         return f"{event.adapter}: {event.state}" + (f" ({event.reason})" if event.reason else "")
     if isinstance(event, ScanEvent):
-        low, high = event.sector_deg
+        low, high = event.sector
         gaps = f", {event.gaps} missing" if event.gaps else ""
         return f"scan {event.scan}: {event.radials} radials{gaps}, {low:+.0f} to {high:+.0f} deg, {event.range_nm:g} NM"
     if isinstance(event, IntegrityEvent):

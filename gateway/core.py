@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from gateway.events import Event
 from gateway.pipeline import Pipeline
-from gateway.queues import ByteQueue
+from gateway.queues import OVERHEAD_BYTES, ByteQueue
 from gateway.records import Raw, Record, Status
 
 LIMIT_BYTES = 64 << 20
@@ -71,12 +71,17 @@ class CoreQueue:
     def deliver(self, records: list[Record]) -> None:
         """Pass records on; those without room are skipped and reported once there is room again."""
         for record in records:
-            size = len(record.data) if isinstance(record, Raw) else 0
+            size = len(record.data) + OVERHEAD_BYTES if isinstance(record, Raw) else 0
             if not self.queue.put(record, size):
                 self._skipped += 1
             elif self._skipped and not isinstance(record, Status):  # or the report would report itself
                 self._report(f"{self._skipped} records skipped")
                 self._skipped = 0
+
+    @property
+    def skipped(self) -> int:
+        """Records skipped and not yet reported, which at the end nobody reports any more."""
+        return self._skipped
 
     def run(self, core: Core) -> None:
         """The work of the core's thread, until the queue is closed and empty."""

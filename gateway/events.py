@@ -37,7 +37,7 @@ class ScanEvent(Event):
     type: ClassVar[str] = "scan"
     scan: int
     radials: int
-    sector_deg: tuple[float, float]
+    sector: tuple[float, float]  # smallest and largest scan angle, degrees
     range_nm: float
     tilt_deg: float
     gaps: int
@@ -46,7 +46,7 @@ class ScanEvent(Event):
 
 @dataclass(frozen=True)
 class StateEvent(Event):
-    """The aircraft's state: the newest sample of each quantity, with validity and age."""
+    """The aircraft's state: each quantity brought to the event's time, its validity, and its newest sample's age."""
 
     type: ClassVar[str] = "state"
     values: dict[str, float | None]

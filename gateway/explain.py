@@ -29,7 +29,7 @@ def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]
     meaning = f.SSM_TABLES[definition.ssm][ssm] if definition else "depends on the label"
     rows = [
         ("label", "1-8", f"{label:03o}", name),
-        ("SDI", "9-10", f"{int(parts.sdi[0]):02b}", "data in labels of 20 bits"),
+        ("SDI", "9-10", f"{int(parts.sdi[0]):02b}", "data" if definition and not definition.has_sdi else "source"),
         ("data", "11-29", f"{int(parts.data[0]):019b}", f"0x{int(parts.data[0]):05x}"),
         ("SSM", "30-31", f"{ssm:02b}", meaning),
         ("parity", "32", f"{word >> 31}", "odd, good" if parts.parity_ok[0] else "BAD: the word is damaged"),

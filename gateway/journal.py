@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from gateway.queues import ByteQueue
+from gateway.queues import OVERHEAD_BYTES, ByteQueue
 from gateway.recording import Recorder
 from gateway.records import Note, Raw, Record, Stamp, Status, Tick
 
@@ -64,7 +64,7 @@ class Journal:
     def chunk(self, adapter: str, data: bytes) -> None:
         """Take bytes from an adapter's thread; without room they are dropped, and the next chunk says how many."""
         dropped = self._dropped.get(adapter, 0)
-        if self.queue.put(Chunk(now(), adapter, data, dropped), len(data)):
+        if self.queue.put(Chunk(now(), adapter, data, dropped), len(data) + OVERHEAD_BYTES):
             self._dropped[adapter] = 0
         else:
             self._dropped[adapter] = dropped + len(data)

@@ -27,6 +27,8 @@ class Channel429:
     definitions: Definitions
     orientation: str
 
+    packet_type: ClassVar[int] = f.WORDS_429
+
     @property
     def role(self) -> str:
         """What only one channel can be at a time."""
@@ -38,6 +40,7 @@ class Channel708:
     """An ARINC 708 channel."""
 
     profile: str
+    packet_type: ClassVar[int] = f.WORD_708
     role: ClassVar[str] = "radar"
 
 

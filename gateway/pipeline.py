@@ -19,7 +19,7 @@ from gateway.records import Note, Raw, Record, Status, Tick
 from gateway.timebase import Timebase
 from monitor.aircraft import Aircraft, status_name
 from monitor.integrity import Comparison, Monitor, Verdict
-from monitor.scans import Scan, ScanBuilder
+from monitor.scans import SILENCE_NS, Scan, ScanBuilder
 
 SPOILT = f.FLAG_CODING | f.FLAG_WORD_LENGTH | f.FLAG_SYNC  # words whose bits cannot be trusted
 QUIET_NS = 5_000_000_000
@@ -55,8 +55,8 @@ class Pipeline:
         self._now_host_ns: int | None = None  # and when that word was read
         self._heard: dict[str, int] = {}  # adapter -> monotonic time of its last chunk
         self._quiet: set[str] = set()
-        self._users: dict[str, tuple[str, int]] = {}  # which adapter's channel gives each role
-        self._unused: set[tuple[str, int]] = set()  # channels not used, told already
+        self._users: dict[str, tuple[tuple[str, int], int]] = {}  # by role: adapter and channel, and when last heard
+        self._unused: dict[tuple[str, int], str] = {}  # why a channel is not used, told already
         self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
         self._scan_number = 0
         self._last: Record | None = None
@@ -75,6 +75,8 @@ class Pipeline:
             self._counters[f"{record.adapter}.{record.state.lower()}"] += 1
             if record.state == "UP":  # a line that never gives a byte is quiet too
                 self._heard.setdefault(record.adapter, record.stamp.monotonic_ns)
+                if self._monitor:
+                    self._heard.setdefault(RADAR, record.stamp.monotonic_ns)
             if record.state in ("LOST", "BEHIND", "FAILED"):
                 self._troubles[record.adapter] = f"degraded: {record.adapter} {record.state}: {record.reason}"
             yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, record.state, record.reason)
@@ -129,57 +131,73 @@ class Pipeline:
         elif packet.type != f.TIME_MARK:
             link.counters["packets_of_unknown_type"] += 1
 
-    def _channel(
-        self, link: Link, packet: Packet, record: Raw
-    ) -> Generator[Event, None, Channel429 | Channel708 | None]:
-        """What the packet's channel carries; None if it cannot be used, which is said once.
+    def _claim(self, link: Link, packet: Packet, record: Raw) -> Generator[Event, None, bool]:
+        """Whether the words of a packet can be used; if not, why is said once.
 
-        Two IRUs, or two radars, are never mixed: the first channel heard of each kind is used.
+        Two IRUs, or two radars, are never mixed: the first channel of each role is used until it falls silent.
         """
-        here = (record.adapter, packet.channel)
+        here, now_ns = (record.adapter, packet.channel), record.stamp.monotonic_ns
         channel = link.channels.get(packet.channel)
         if channel is None:
-            reason = "until a hello or [adapters.channels] says what it carries"
-        elif self._users.setdefault(channel.role, here) != here:
-            adapter, number = self._users[channel.role]
-            reason = f"because channel {number} of {adapter} is the {channel.role} in use"
+            why = "until a hello or [adapters.channels] says what it carries"
+        elif packet.type != channel.packet_type or packet.flags & SPOILT:
+            return False
         else:
-            return channel
-        if here not in self._unused:
-            self._unused.add(here)
-            reason = f"channel {packet.channel} is recorded but not used {reason}"
+            user, heard_ns = self._users.get(channel.role, (here, now_ns))
+            if user == here or now_ns - heard_ns > QUIET_NS:
+                self._users[channel.role] = (here, now_ns)
+                return True
+            why = f"because channel {user[1]} of {user[0]} is the {channel.role} in use"
+        reason = f"channel {packet.channel} is recorded but not used {why}"
+        if self._unused.get(here) != reason:
+            self._unused[here] = reason
             yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "UNUSED_CHANNEL", reason)
-        return None
+        return False
+
+    def _offset_ns(self, packet: Packet, record: Raw) -> Generator[Event, None, int]:
+        """What to add to the packet's device times; a clock that began anew makes all older state worthless."""
+        restarts = self._timebase.restarts
+        offset_ns = self._timebase.offset_ns(record.adapter, packet.time_ns, record.stamp.monotonic_ns)
+        if self._timebase.restarts > restarts:
+            for scan in self._scans.finish():
+                yield from self._judge(scan, record)
+            self._aircraft = Aircraft()
+            reason = f"the bridge's clock began anew at {packet.time_ns / 1e9:.3f} s; the state before it is dropped"
+            self._troubles[f"clock of {record.adapter}"] = f"degraded: {record.adapter}: {reason}"
+            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "CLOCK_RESTARTED", reason)
+        self._now_ns, self._now_host_ns = packet.time_ns + offset_ns, record.stamp.monotonic_ns
+        return offset_ns
 
     def _words(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         block = words429(packet)
         link.counters["words_429"] += len(block.words)
-        if not block.well_formed:
+        in_order = bool(np.all(np.diff(block.time_ns) >= 0))
+        if not (block.well_formed and in_order):
             link.counters["malformed_bodies"] += 1
-        channel = yield from self._channel(link, packet, record)
-        if not isinstance(channel, Channel429) or packet.flags & SPOILT or not len(block.words):
+        usable = len(block.words) and in_order and (yield from self._claim(link, packet, record))
+        channel = link.channels.get(packet.channel)
+        if not usable or not isinstance(channel, Channel429):
             link.counters["words_429_unused"] += len(block.words)
             return
         values = arinc429.decode(block.words, channel.definitions, channel.orientation)
         for status, count in enumerate(np.bincount(values.status).tolist()):
             if status and count:
                 link.counters[f"words_429_{arinc429.Status(status).name.lower()}"] += count
-        times = block.time_ns + self._timebase.offset_ns(record.adapter, packet.time_ns, record.stamp.monotonic_ns)
-        self._now_ns, self._now_host_ns = int(times[-1]), record.stamp.monotonic_ns
-        self._aircraft.feed(channel.equipment, times, block.words, values)
+        offset_ns = yield from self._offset_ns(packet, record)
+        self._aircraft.feed(channel.equipment, block.time_ns + offset_ns, block.words, values)
 
     def _radar(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         word = radar_word(packet)
         link.counters["words_708"] += 1
-        channel = yield from self._channel(link, packet, record)
-        if not isinstance(channel, Channel708) or packet.flags & SPOILT or word.bit_count != f.WORD_708_BITS:
+        usable = word.bit_count == f.WORD_708_BITS and (yield from self._claim(link, packet, record))
+        channel = link.channels.get(packet.channel)
+        if not usable or not isinstance(channel, Channel708):
             link.counters["words_708_unused"] += 1
             return
         yield from self._hear(RADAR, record)
         radials = arinc708.unpack(np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile)
-        offset = self._timebase.offset_ns(record.adapter, packet.time_ns, record.stamp.monotonic_ns)
-        self._now_ns, self._now_host_ns = packet.time_ns + offset, record.stamp.monotonic_ns
-        for scan in self._scans.feed(np.array([self._now_ns]), radials):
+        offset_ns = yield from self._offset_ns(packet, record)
+        for scan in self._scans.feed(np.array([packet.time_ns + offset_ns]), radials):
             yield from self._judge(scan, record)
 
     def _judge(self, scan: Scan, record: Record) -> Iterator[Event]:
@@ -189,7 +207,7 @@ class Pipeline:
             *stamp,
             scan=scan.number,
             radials=len(scan.time_ns),
-            sector_deg=scan.sector_deg,
+            sector=scan.sector_deg,
             range_nm=scan.range_nm,
             tilt_deg=scan.tilt_deg,
             gaps=scan.missing,
@@ -215,16 +233,16 @@ class Pipeline:
         stamp = record.stamp.utc_ns, record.sequence
         for source, heard_ns in self._heard.items():
             silent_ns = record.stamp.monotonic_ns - heard_ns
+            if source == RADAR and silent_ns > SILENCE_NS:
+                for scan in self._scans.finish():
+                    yield from self._judge(scan, record)
             if silent_ns > QUIET_NS and source not in self._quiet:
                 self._quiet.add(source)
                 reason = f"no words for {silent_ns / 1e9:.1f} s"
                 yield StatusEvent(*stamp, source, "QUIET", reason)
-                if source == RADAR:
-                    for scan in self._scans.finish():
-                        yield from self._judge(scan, record)
-                    if self._monitor:
-                        silence = self._monitor.unavailable(self._scan_number, [f"radar: {reason}"])
-                        yield self._verdict(silence, self._monitor, record)
+                if source == RADAR and self._monitor:
+                    silence = self._monitor.unavailable(self._scan_number, [f"radar: {reason}"])
+                    yield self._verdict(silence, self._monitor, record)
         yield self._state(record)
 
     def _state(self, record: Tick) -> StateEvent:

@@ -5,6 +5,8 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+OVERHEAD_BYTES = 300  # what a waiting chunk takes besides its bytes; givers add it, or small chunks would cost nothing
+
 T = TypeVar("T")
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from gateway.config import RackConfig
 from gateway.core import Core, Emit
+from gateway.events import Event
 from gateway.pipeline import Pipeline, Watcher
 from gateway.recording import Recording
 from monitor.integrity import Monitor
@@ -24,9 +25,16 @@ def replay(
 ) -> int:
     """Emit the events of a recording, as fast as possible or at `speed` times real time; return the core's failures.
 
-    `start_s` and `stop_s` count from the first record; what lies outside is not fed at all.
+    `start_s` and `stop_s` count from the first record. What lies before `start_s` is fed all the same, since what comes
+    later depends on it, but its events are not emitted.
     """
-    core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, report)
+    begun = False
+
+    def emit_once_begun(event: Event) -> None:
+        if begun:
+            emit(event)
+
+    core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit_once_begun, report)
     began_ns = time.monotonic_ns()
     first_ns: int | None = None
     for record in recording:
@@ -34,9 +42,9 @@ def replay(
         elapsed_s = (record.stamp.monotonic_ns - first_ns) / 1e9
         if stop_s is not None and elapsed_s > stop_s:
             break
-        if elapsed_s < start_s:
-            continue
-        if speed:
+        if not begun and elapsed_s >= start_s:
+            begun, began_ns = True, time.monotonic_ns()
+        if begun and speed:
             time.sleep(max(0.0, (elapsed_s - start_s) / speed - (time.monotonic_ns() - began_ns) / 1e9))
         core.process(record)
     core.finish()

@@ -21,6 +21,8 @@ from monitor.warmup import warm_up
 
 FIRST_OPEN_S = 3.0
 POLL_S = 0.1
+MOST_FAILURES = 10
+LAST_WORDS_S = 30.0  # for a backlog of events; then the process ends whether they were read or not
 
 
 class Service:
@@ -63,6 +65,11 @@ class Service:
                 self.stop()
                 raise GatewayError("; ".join(errors))
 
+    @property
+    def stuck(self) -> bool:
+        """Whether the core did not come to its end in time, so that only leaving the process ends it."""
+        return self._core_thread.is_alive()
+
     def run_until(self, stop: threading.Event, seconds: float | None = None) -> None:
         """Run until `stop` is set, the time is over, or a thread that the gateway needs has died."""
         self.start()
@@ -82,7 +89,13 @@ class Service:
         self._journal.queue.close()
         self._journal_thread.join()
         self._to_core.queue.close()
-        self._core_thread.join()
+        self._core_thread.join(LAST_WORDS_S)
+        if self._core_thread.is_alive():
+            self.failures.append(
+                f"core: still not done {LAST_WORDS_S:.0f} s after the end; whoever reads our output stands still"
+            )
+        if self._to_core.skipped:
+            self.failures.append(f"core: {self._to_core.skipped} records skipped at the end; replay the recording")
         if self._journal.recording_error:
             self.failures.append(f"recording stopped: {self._journal.recording_error}")
 
@@ -97,7 +110,8 @@ class Service:
         return GuardedThread(name, work, self._died)
 
     def _core_failed(self, reason: str) -> None:
-        self.failures.append(f"core: {reason}")
+        if len(self.failures) < MOST_FAILURES:  # the recording has them all
+            self.failures.append(f"core: {reason}")
         self._journal.report("core", "FAILED", reason)
 
     def _died(self, name: str, error: BaseException) -> None:

@@ -42,10 +42,10 @@ class Supervisor:
                 self._stopping.wait(wait_s)
                 wait_s = min(2 * wait_s, LONGEST_WAIT_S)
                 continue
-            wait_s = FIRST_WAIT_S
             self._first_open.set()
             self._state("UP")
-            self._read(port)
+            gave = self._read(port)
+            wait_s = FIRST_WAIT_S if gave else min(2 * wait_s, LONGEST_WAIT_S)
             self._stopping.wait(wait_s)
         self._state("CLOSED")
 
@@ -58,17 +58,21 @@ class Supervisor:
         """Ask the thread to end; it does within a read's wait."""
         self._stopping.set()
 
-    def _read(self, port: Port) -> None:
+    def _read(self, port: Port) -> bool:
+        """Read until the line is lost; whether it ever gave anything."""
+        gave = False
         try:
             while not self._stopping.is_set():
                 chunk = port.read()
                 if chunk:
                     self._deliver(self.name, chunk)
+                    gave = True
         except Exception as error:  # noqa: BLE001 # pyserial alone raises four unrelated kinds on unplugging
             self._state("LOST", _reason(error))
         finally:
             with contextlib.suppress(Exception):  # the line is given up, whatever its driver says to that
                 port.close()
+        return gave
 
     def _state(self, state: str, reason: str = "") -> None:
         self._report(self.name, state, reason)

@@ -14,7 +14,7 @@ from decoders.arinc429 import Status, Values429, join_position
 from monitor.geodesy import FT_M, KT_M_S
 from monitor.track import MISSING, NORMAL, STALE, Quantity, Track
 
-EPOCH_NS = 100_000_000  # coarse and fine further apart belong to two epochs: sets come every 200 ms or more
+EPOCH_NS = 40_000_000  # a set is sent in one burst, at low speed in 35 ms; the next comes 100 ms later or more
 
 LATITUDE = Quantity("latitude_deg", 2.5, angle=True)
 LONGITUDE = Quantity("longitude_deg", 2.5, angle=True)

@@ -31,7 +31,10 @@ NEEDED = (state.LATITUDE, state.LONGITUDE, state.HEIGHT, state.PITCH, state.ROLL
 
 @dataclass(frozen=True)
 class Verdict:
-    """The answer for one scan, and the numbers behind it. Disparities are in range bins."""
+    """The answer for one scan, and the numbers behind it. Disparities are in range bins.
+
+    `mdb_bins` is the minimum detectable bias of the published test, with the plain rms of the calibration.
+    """
 
     scan: int
     verdict: str
@@ -93,6 +96,8 @@ class Monitor:
             return f"range setting {scan.range_nm:g} NM is beyond {LONGEST_RANGE_NM:g} NM, where shadows mean nothing"
         if 2 * scan.repeated > len(scan.time_ns):
             return f"scanner stuck: the scan angle did not change on {scan.repeated} of {len(scan.time_ns)} radials"
+        if scan.faults:
+            return f"radar reports faults: bits {scan.faults:07b} of the header's 18 to 24, the first at the right"
         return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm)
 
     def _point(
@@ -114,6 +119,8 @@ class Monitor:
             reasons.append(
                 f"{np.count_nonzero(polar)} radials start beyond {HIGHEST_LATITUDE_DEG:g} degrees of latitude"
             )
+        if scan.missing:
+            reasons.append(f"{scan.missing} radials are missing inside the sweep")
         if scan.beyond_limits.any():
             reasons.append(f"{np.count_nonzero(scan.beyond_limits)} radials have attitude or tilt beyond limits")
         lat, lon, height, pitch, roll, heading = (values.value[usable] for values in found)
@@ -162,9 +169,15 @@ class Monitor:
         q = robust_statistic(d, c.median_bins, c.clip_bins, c.sigma_bins)
         t_normalised = normalised(d, c.rms_bins)
         if s.method == "robust":
-            value, limit, sigma = q, robust_threshold(n, s.p_fa, c.variance_factor), c.sigma_bins
+            value, limit = q, robust_threshold(n, s.p_fa, c.variance_factor)
         else:
-            value, limit, sigma = t_normalised, threshold(n, s.p_fa), c.rms_bins
+            value, limit = t_normalised, threshold(n, s.p_fa)
+        most = n * (c.clip_bins / c.sigma_bins) ** 2  # what Q comes to if every pair is clipped
+        if s.method == "robust" and most <= limit:
+            blind = (
+                f"{n} pairs cannot alert at P_FA {s.p_fa:g}: Q reaches {most:.1f} at most, its threshold is {limit:.1f}"
+            )
+            return self.unavailable(scan.number, [blind, *reasons], comparison)
         if value > limit:
             reasons.insert(0, f"{'Q' if s.method == 'robust' else 'N T / sigma^2'} {value:.1f} exceeds {limit:.1f}")
         return Verdict(
@@ -180,7 +193,7 @@ class Monitor:
             mean_stderr_bins=float(np.std(d, ddof=1) / math.sqrt(n)),
             unmatched_radar=comparison.unmatched_radar,
             unmatched_dem=comparison.unmatched_dem,
-            mdb_bins=minimum_detectable_bias(n, sigma, s.p_fa, s.p_md),
+            mdb_bins=minimum_detectable_bias(n, c.rms_bins, s.p_fa, s.p_md),
             calibration=c.name,
         )
 

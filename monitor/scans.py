@@ -32,6 +32,7 @@ class Scan:
     range_nm: float
     mode: int
     stabilised: bool
+    faults: int  # header bits 18 to 24 of all its radials together, bit 18 the least significant
     missing: int
     repeated: int
 
@@ -48,6 +49,7 @@ class ScanBuilder:
         self.number = 0
         self._rows: list[tuple[int, float, bool, NDArray[np.uint8]]] = []
         self._settings = (0.0, 0.0, 0, False, 0)  # tilt, range, mode, stabilised, bins
+        self._faults = 0
         self._direction = 0.0
 
     def feed(self, time_ns: NDArray[np.int64], radials: Radials) -> Iterator[Scan]:
@@ -65,6 +67,7 @@ class ScanBuilder:
             if self._rows and (settings != self._settings or self._turns(int(time_ns[k]), angles[k])):
                 yield self._close()
             self._settings = settings
+            self._faults |= int(radials.faults[k])
             self._rows.append((int(time_ns[k]), angles[k], bool(limits[k]), radials.bins[k]))
 
     def finish(self) -> Iterator[Scan]:
@@ -86,7 +89,7 @@ class ScanBuilder:
         times, angles, limits, bins = zip(*self._rows, strict=True)
         steps = np.abs(wrap(np.diff(np.array(angles))))
         moving = steps[steps > 0]
-        missing = int(np.sum(np.round(moving / np.median(moving)) - 1)) if moving.size else 0
+        missing = int(np.sum(np.maximum(np.round(moving / np.median(moving)) - 1, 0))) if moving.size else 0
         scan = Scan(
             self.number,
             np.array(times, np.int64),
@@ -97,10 +100,12 @@ class ScanBuilder:
             range_nm,
             mode,
             stabilised,
+            self._faults,
             missing,
             int(np.sum(steps == 0)),
         )
         self.number += 1
         self._rows = []
         self._direction = 0.0
+        self._faults = 0
         return scan

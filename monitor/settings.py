@@ -44,5 +44,5 @@ class MonitorSettings(BaseModel):
 
     @property
     def pairs_needed(self) -> int:
-        """The least number of pairs for a verdict: with fewer, the clipped Q could not reach its threshold."""
+        """The least number of pairs for a verdict; where Q could not reach its threshold, more are needed."""
         return self.minimum_pairs or (20 if self.p_fa <= 1e-4 else 16)

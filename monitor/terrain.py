@@ -20,6 +20,7 @@ from rasterio.enums import Resampling
 from rasterio.errors import RasterioError
 from rasterio.vrt import WarpedVRT
 
+MOST_POSTS = 400_000_000  # 1.6 GB; files far apart would fill the memory with nothing
 WGS84 = CRS.from_epsg(4326)
 ALIGNMENT_POSTS = 0.05  # files whose posts miss a common grid by more are refused: resampling is not ours to hide
 
@@ -103,6 +104,8 @@ def _mosaic(tiles: list[Grid], paths: list[Path]) -> Grid:
     corners = [(row - top, column - left) for row, column in offsets]
     rows = max(row + tile.height_m.shape[0] for (row, _), tile in zip(corners, tiles, strict=True))
     columns = max(column + tile.height_m.shape[1] for (_, column), tile in zip(corners, tiles, strict=True))
+    if rows * columns > MOST_POSTS:
+        raise TerrainError(f"the terrain files span {rows} x {columns} posts: name only those that the flight needs")
     height_m = np.full((rows, columns), np.nan, np.float32)
     for (row, column), tile in zip(corners, tiles, strict=True):
         place = height_m[row : row + tile.height_m.shape[0], column : column + tile.height_m.shape[1]]

@@ -34,6 +34,7 @@ def warm_up(monitor: Monitor) -> None:
         range_nm=10.0,
         mode=2,
         stabilised=True,
+        faults=0,
         missing=0,
         repeated=0,
     )

@@ -42,7 +42,7 @@ def play(
             outlet.write(data)
         except Closed:
             break
-        if origin is None:  # only now has a reader come
+        if origin is None:  # a TCP outlet has waited for its client until now
             origin = time.monotonic() - due_s
         played.worst_lateness_s = max(played.worst_lateness_s, time.monotonic() - origin - due_s)
         played.packets += 1

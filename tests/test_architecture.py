@@ -89,6 +89,7 @@ def test_the_command_line_imports_its_work_lazily() -> None:
         "gateway",
         "typer",
         "typing",
+        "os",
         "pathlib",
         "sys",
         "signal",

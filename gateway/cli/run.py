@@ -1,5 +1,6 @@
 """`shadebus run`: the service."""
 
+import os
 import signal
 import sys
 import threading
@@ -36,11 +37,14 @@ def run(
         rack = check_config({"adapters": adapters}, "--source")
     changes: dict[str, object] = {}
     if dem:
-        changes["terrain"] = dem
+        changes["terrain"] = [path.absolute() for path in dem]
     if record:
-        changes["recording"] = {**(rack.recording.model_dump() if rack.recording else {}), "directory": record}
+        changes["recording"] = {
+            **(rack.recording.model_dump() if rack.recording else {}),
+            "directory": record.absolute(),
+        }
     if calibration:
-        changes["calibration"] = calibration
+        changes["calibration"] = calibration.absolute()
     if wait:
         changes["wait_for_devices"] = True
     rack = check_config({**rack.model_dump(), **changes}, "options")
@@ -54,5 +58,8 @@ def run(
     if service.recording_path:
         print(f"recording to {service.recording_path}", file=sys.stderr)
     service.run_until(stop, seconds)
+    if service.stuck:  # it holds stdout, so an orderly exit would wait for it too
+        print(f"shadebus: {'; '.join(service.failures)}", file=sys.stderr, flush=True)
+        os._exit(1)
     if service.failures:
         raise GatewayError("; ".join(service.failures))

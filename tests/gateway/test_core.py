@@ -7,6 +7,7 @@ import pytest
 from gateway import core as core_module
 from gateway.core import Core, CoreQueue
 from gateway.events import Event, StatusEvent
+from gateway.queues import OVERHEAD_BYTES
 from gateway.records import Raw, Record
 from tests.gateway.made import raw, stamp, status, tick
 
@@ -92,7 +93,7 @@ def test_a_listener_that_has_left_is_reported_once_and_not_asked_again() -> None
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(core_module, "LIMIT_BYTES", 100)
+    monkeypatch.setattr(core_module, "LIMIT_BYTES", 2 * (40 + OVERHEAD_BYTES) + 20)
 
 
 def test_a_core_that_falls_behind_skips_the_newest_and_says_how_many(small: None) -> None:

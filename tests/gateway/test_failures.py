@@ -260,3 +260,26 @@ def test_a_full_device_as_standard_output_is_told(line: PtyOutlet, tmp_path: Pat
     assert done.returncode == 1
     assert os.strerror(errno.ENOSPC) in done.stderr
     assert "Traceback" not in done.stderr and "Exception" not in done.stderr
+
+
+def test_a_listener_that_stands_still_cannot_hold_the_gateway(
+    line: PtyOutlet, make_rack: MakeRack, stream: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(service_module, "LAST_WORDS_S", 0.2)
+    moving, asked = threading.Event(), threading.Event()
+
+    def stand_still(_: Event) -> None:
+        asked.set()
+        moving.wait(60)
+
+    service = Service(make_rack(f"serial:{line.path}"), None, stand_still)
+    service.start()
+    line.write(stream[:1000])
+    assert asked.wait(10)
+    service.stop()
+    assert service.stuck
+    assert any("stands still" in failure for failure in service.failures)
+    moving.set()
+    path = service.recording_path
+    assert path is not None
+    assert stream.startswith(recorded_bytes(path))

@@ -11,6 +11,7 @@ import pytest
 
 from gateway import journal as journal_module
 from gateway.journal import Journal
+from gateway.queues import OVERHEAD_BYTES
 from gateway.recording import Recorder
 from gateway.records import Note, Raw, Record, Stamp, Status, Tick
 from tests.gateway.live import wait_until
@@ -87,7 +88,7 @@ def test_records_are_numbered_in_order_whatever_their_kind() -> None:
 
 def test_a_full_queue_drops_the_newest_bytes_and_the_next_chunk_of_that_adapter_says_how_many() -> None:
     log = Log()
-    journal = make(log, limit_bytes=10)
+    journal = make(log, limit_bytes=10 + 2 * OVERHEAD_BYTES)
     journal.chunk("bridge", b"12345678")
     journal.chunk("bridge", b"lost")
     journal.chunk("bridge", b"gone")

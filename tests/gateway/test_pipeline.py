@@ -75,7 +75,7 @@ def test_a_sweep_becomes_a_scan_of_the_record_that_ended_it() -> None:
         3,
         scan=0,
         radials=10,
-        sector_deg=(pytest.approx(-15, abs=0.05), pytest.approx(12, abs=0.05)),  # type: ignore[arg-type]
+        sector=(pytest.approx(-15, abs=0.05), pytest.approx(12, abs=0.05)),  # type: ignore[arg-type]
         range_nm=10.0,
         tilt_deg=-2.0,
         gaps=0,
@@ -265,3 +265,48 @@ def test_channels_of_the_configuration_need_no_hello() -> None:
     events = feed(pipeline, raw(1, 0, words + sweep(bridge, 0)), tick(2, 0.3))
     assert only(StateEvent, events)[0].validity["latitude_deg"] == "NORMAL"
     assert len(only(ScanEvent, events)) == 1
+
+
+def test_a_bridge_that_starts_anew_takes_the_state_before_it_along() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    words = b"".join(bridge.words(GNSS, 100 + 0.2 * k, position()) for k in range(3))
+    (known,) = only(StateEvent, feed(pipeline, raw(1, 0, bridge.hello(100) + words), tick(2, 0.1)))
+    assert known.validity["latitude_deg"] == "NORMAL"
+    told = feed(pipeline, raw(3, 0.2, bridge.words(IRU, 0.0, [0])), tick(4, 0.3))
+    assert [event.state for event in only(StatusEvent, told)] == ["CLOCK_RESTARTED"]
+    (state,) = only(StateEvent, told)
+    assert state.validity["latitude_deg"] == "MISSING"
+
+
+def test_a_radar_that_is_never_heard_is_unavailable(monitor: Monitor) -> None:
+    pipeline = Pipeline(RACK, monitor)
+    events = feed(pipeline, status(0, 0, "UP"), *(tick(k, k) for k in range(1, 9)))
+    (verdict,) = only(IntegrityEvent, events)
+    assert verdict.verdict == "unavailable"
+    assert "radar: no words" in verdict.reasons[0]
+
+
+def test_a_spoilt_word_does_not_make_its_channel_the_radar_in_use() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    other = RADAR + 7
+    said = bridge.hello() + bridge.hello(body=racklink.hello(1, 1, [(other, f.KIND_708, 0, 0)]))
+    spoilt = bridge.packet(f.WORD_708, other, 0.1, racklink.word_708(radial(0)), f.FLAG_CODING)
+    feed(pipeline, raw(0, 0, said + spoilt + bridge.radar(0.2, radial(0))))
+    assert counters(pipeline)["bridge.words_708_unused"] == 1
+
+
+def test_another_channel_takes_over_once_the_one_in_use_is_silent() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    other = IRU + 7
+    said = bridge.hello() + bridge.hello(body=racklink.hello(1, 1, [(other, f.KIND_429_HIGH, 0, 4)]))
+    feed(pipeline, raw(0, 0, said + bridge.words(IRU, 0.1, [0]) + bridge.words(other, 0.2, [0])))
+    feed(pipeline, raw(1, 10, bridge.words(other, 10.2, [0])))
+    assert counters(pipeline)["bridge.words_429_unused"] == 1
+
+
+def test_words_that_run_backwards_inside_a_packet_are_counted_and_not_used() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    words = bridge.packet(f.WORDS_429, IRU, 0.1, racklink.words_429([9, 3], [0, 0]))
+    feed(pipeline, raw(0, 0, bridge.hello() + words))
+    found = counters(pipeline)
+    assert (found["bridge.malformed_bodies"], found["bridge.words_429_unused"]) == (1, 2)

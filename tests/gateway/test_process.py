@@ -49,6 +49,9 @@ def test_run_and_replay_print_the_same_bytes(
     assert (again.returncode, again.stderr) == (0, "")
     assert again.stdout == gateway.output.decode()
     assert again.stdout.count('"type":"integrity"') == 3
+    late = shadebus("replay", path, "--json", "--start", "0.4").stdout
+    assert 0 < len(late) < len(again.stdout)
+    assert again.stdout.endswith(late)
 
     info = shadebus("info", path).stdout
     assert "closed with its index" in info

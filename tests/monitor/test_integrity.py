@@ -73,6 +73,7 @@ def scan_of(echoes: NDArray[np.uint8], angles: NDArray[np.float64] = ANGLES) -> 
         range_nm=10.0,
         mode=MODES_708["map"],
         stabilised=True,
+        faults=0,
         missing=0,
         repeated=0,
     )
@@ -165,7 +166,7 @@ def test_the_standard_error_of_the_mean_and_the_detectable_bias_are_stated(
     variance = 4 * farther * (n - farther) / n / (n - 1)
     assert verdict.mean_stderr_bins == pytest.approx(sqrt(variance / n))
     assert verdict.mdb_bins is not None
-    noncentrality = n * (verdict.mdb_bins / 2.5) ** 2
+    noncentrality = n * (verdict.mdb_bins / 5.0) ** 2  # the rms of the calibration, as in the published test
     assert float(ncx2.cdf(chi2.isf(1e-4, n), n, noncentrality)) == pytest.approx(1e-3, rel=1e-6)
 
 
@@ -210,6 +211,20 @@ def test_too_few_pairs_are_unavailable_whatever_they_say(white_mountains: Terrai
     assert verdict.unmatched_radar is not None
     lenient = MonitorSettings(minimum_pairs=2, p_fa=0.1)
     assert judge(white_mountains, part, settings=lenient)[0].verdict == "alert"
+
+
+def test_pairs_that_could_not_alert_however_wrong_are_unavailable_and_never_good(
+    white_mountains: Terrain, honest: Scan
+) -> None:
+    part = replace(honest, bins=np.where(np.arange(len(honest.bins))[:, None] < 3, honest.bins, 0))
+    strict = MonitorSettings(minimum_pairs=2, p_fa=1e-9)
+    verdict, _ = judge(white_mountains, part, settings=strict)
+    assert verdict.verdict == "unavailable"
+    assert "cannot alert at P_FA 1e-09" in verdict.reasons[0]
+
+
+def test_a_radar_that_reports_a_fault_is_refused(white_mountains: Terrain, honest: Scan) -> None:
+    assert "faults: bits 1000000" in refused(white_mountains, replace(honest, faults=1 << 6))
 
 
 def test_no_echo_at_all_is_unavailable_and_never_good(white_mountains: Terrain, honest: Scan) -> None:
