@@ -42,7 +42,7 @@ class Core:
         try:
             for event in self._pipeline.finish():
                 self._say(event)
-        except Exception as error:  # noqa: BLE001
+        except Exception as error:  # noqa: BLE001 # as in process: told and counted, and the thread ends in order
             self._failed("end", error)
 
     def _say(self, event: Event) -> None:
