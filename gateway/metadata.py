@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from gateway.config import RackConfig
 from gateway.errors import GatewayError
-from monitor.calibration import UNCALIBRATED, Calibration, load_calibration
+from monitor.calibration import Calibration, load_calibration
 from monitor.integrity import Monitor
 from monitor.terrain import TerrainError, open_terrain
 
@@ -31,7 +31,7 @@ def describe(config: RackConfig, monitor: Monitor | None) -> dict[str, str]:
     return {
         # not model_dump_json, which writes an infinite number as null and so could not read it back
         "configuration": json.dumps(config.model_dump(mode="json")),
-        "calibration": monitor.calibration.model_dump_json() if monitor else "",
+        "calibration": monitor.calibration.model_dump_json() if monitor and monitor.calibration else "",
         "terrain_checksum": monitor.terrain.checksum if monitor else "",
         "shadebus": version("shadebus"),
         "numpy": version("numpy"),
@@ -57,8 +57,6 @@ def recorded_monitor(metadata: dict[str, str], config: RackConfig, terrain: tupl
         calibration = Calibration.model_validate_json(metadata["calibration"]) if metadata["calibration"] else None
     except (KeyError, ValidationError) as error:
         raise GatewayError("the recording's metadata holds no calibration that this version understands") from error
-    if calibration == UNCALIBRATED:
-        calibration = UNCALIBRATED  # itself, by which the monitor knows it
     if terrain:
         config = config.model_copy(update={"terrain": terrain})
     monitor = build_monitor(config, calibration)

@@ -6,6 +6,7 @@ c = E[(Q - N)^2] / E[2 N], which is 1 for independent normal disparities and gro
 """
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -59,15 +60,29 @@ class Calibration(BaseModel):
         return None
 
 
-UNCALIBRATED = Calibration(
-    name="none",
+NO_CALIBRATION = "none"
+
+_DEFAULTS = Calibration(
+    name=NO_CALIBRATION,
     provenance="stated defaults: spread and sigma of a beam-averaged radar over mountains, not measured for this radar",
+    bins=512,
     median_bins=0.0,
     spread_bins=2.2,
     sigma_bins=2.6,
     rms_bins=7.0,
     variance_factor=1.5,
 )
+
+
+@cache
+def uncalibrated(bins: int) -> Calibration:
+    """Stated defaults for a radar of so many bins that nobody has calibrated.
+
+    The errors behind a disparity are angles, so they are a share of the range setting: coarser bins count fewer.
+    """
+    scale = bins / 512
+    scaled = {name: getattr(_DEFAULTS, name) * scale for name in ("spread_bins", "sigma_bins", "rms_bins")}
+    return _DEFAULTS.model_copy(update={"bins": bins, **scaled})
 
 
 def load_calibration(path: Path) -> Calibration:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from decoders.formats import MODES_708
 from monitor import aircraft as state
 from monitor.aircraft import Aircraft, status_name
-from monitor.calibration import UNCALIBRATED, Calibration
+from monitor.calibration import NO_CALIBRATION, Calibration, uncalibrated
 from monitor.disparity import (
     minimum_detectable_bias,
     normalised,
@@ -27,6 +27,7 @@ from monitor.terrain import Terrain
 
 OK, ALERT, UNAVAILABLE = "ok", "alert", "unavailable"
 NEEDED = (state.LATITUDE, state.LONGITUDE, state.HEIGHT, state.PITCH, state.ROLL, state.HEADING)
+MOST_UNMATCHED = 0.6  # share of shadows; without a calibration more of them forbid an ok
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Monitor:
     ) -> None:
         self.terrain = terrain
         self.settings = settings or MonitorSettings()
-        self.calibration = calibration or UNCALIBRATED
+        self.calibration = calibration
 
     def judge(self, scan: Scan, aircraft: Aircraft) -> tuple[Verdict, Comparison | None]:
         """The verdict on a scan; the comparison is None where the radar or the state did not allow one."""
@@ -98,7 +99,7 @@ class Monitor:
             return f"scanner stuck: the scan angle did not change on {scan.repeated} of {len(scan.time_ns)} radials"
         if scan.faults:
             return f"radar reports faults: bits {scan.faults:07b} of the header's 18 to 24, the first at the right"
-        return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm)
+        return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm) if self.calibration else None
 
     def _point(
         self, scan: Scan, aircraft: Aircraft, chosen: NDArray[np.intp]
@@ -161,7 +162,8 @@ class Monitor:
         ), int(np.count_nonzero(void))
 
     def _decide(self, scan: Scan, comparison: Comparison, reasons: list[str]) -> Verdict:
-        s, c, d = self.settings, self.calibration, comparison.disparities
+        s, d = self.settings, comparison.disparities
+        c = self.calibration or uncalibrated(scan.bins.shape[1])
         n = len(d)
         if n < s.pairs_needed:
             few = f"{n} pairs of shadows, {s.pairs_needed} needed"
@@ -180,10 +182,11 @@ class Monitor:
             return self.unavailable(scan.number, [blind, *reasons], comparison)
         if value > limit:
             reasons.insert(0, f"{'Q' if s.method == 'robust' else 'N T / sigma^2'} {value:.1f} exceeds {limit:.1f}")
+        doubts = self._doubts(comparison, t_normalised)
         return Verdict(
             scan=scan.number,
-            verdict=ALERT if value > limit else OK,
-            reasons=tuple(reasons + self._caveats()),
+            verdict=ALERT if value > limit else UNAVAILABLE if doubts else OK,
+            reasons=tuple(doubts + reasons + self._caveats()),
             n_pairs=n,
             t_bins2=statistic(d),
             t_normalised=t_normalised,
@@ -214,11 +217,27 @@ class Monitor:
             unmatched_radar=comparison.unmatched_radar if comparison else None,
             unmatched_dem=comparison.unmatched_dem if comparison else None,
             mdb_bins=None,
-            calibration=self.calibration.name,
+            calibration=self.calibration.name if self.calibration else NO_CALIBRATION,
         )
 
+    def _doubts(self, comparison: Comparison, t_normalised: float) -> list[str]:
+        """What forbids an ok that rests on stated defaults: they may be too wide for this radar, and hide an error."""
+        if self.calibration:
+            return []
+        n = len(comparison.disparities)
+        measures = (
+            ("N T / sigma^2", t_normalised, threshold(n, self.settings.p_fa)),
+            ("the unmatched share of radar shadows", comparison.unmatched_radar, MOST_UNMATCHED),
+            ("the unmatched share of terrain shadows", comparison.unmatched_dem, MOST_UNMATCHED),
+        )
+        return [
+            f"without a calibration no ok: {name} {value:.3g} exceeds {limit:.3g}"
+            for name, value, limit in measures
+            if value is not None and value > limit
+        ]
+
     def _caveats(self) -> list[str]:
-        return ["no calibration loaded: stated defaults in use"] if self.calibration is UNCALIBRATED else []
+        return ["no calibration loaded: stated defaults in use"] if self.calibration is None else []
 
 
 def thin(scan_angle_deg: NDArray[np.float64], spacing_deg: float) -> NDArray[np.intp]:

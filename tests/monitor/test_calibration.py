@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import binom, norm
 
-from monitor.calibration import CLIP_FACTOR, UNCALIBRATED, Calibration, fit, load_calibration
+from monitor.calibration import CLIP_FACTOR, Calibration, fit, load_calibration, uncalibrated
 
 Scans = list[NDArray[np.float64]]
 RNG_SEED = 6
@@ -165,4 +165,11 @@ def test_a_calibration_says_for_which_radar_it_holds() -> None:
     assert made.mismatch(512, 10.0) is None
     assert "made is for 512 range bins, the radar sends 256" in str(made.mismatch(256, 10.0))
     assert "range of 10 NM, the radar is set to 20 NM" in str(made.mismatch(512, 20.0))
-    assert UNCALIBRATED.mismatch(256, 20.0) is None
+
+
+def test_the_stated_defaults_are_the_same_share_of_the_range_setting_for_any_number_of_bins() -> None:
+    fine, coarse = uncalibrated(512), uncalibrated(256)
+    assert coarse.mismatch(256, 20.0) is None
+    for name in ("spread_bins", "sigma_bins", "rms_bins", "clip_bins"):
+        assert getattr(fine, name) == 2 * getattr(coarse, name)
+    assert fine.variance_factor == coarse.variance_factor

@@ -16,7 +16,7 @@ from scipy.stats import chi2, ncx2
 
 from decoders.formats import MODES_708
 from monitor.aircraft import Aircraft
-from monitor.calibration import UNCALIBRATED, Calibration
+from monitor.calibration import NO_CALIBRATION, Calibration
 from monitor.integrity import NEEDED, Comparison, Monitor, Verdict, thin
 from monitor.prediction import Beam, Pointing, predict
 from monitor.scans import Scan
@@ -187,9 +187,28 @@ def test_every_verdict_without_a_calibration_says_so(white_mountains: Terrain, h
     found = [judge(white_mountains, scan, calibration=None)[0] for scan in (honest, moved(honest, 12), silent)]
     assert [verdict.verdict for verdict in found] == ["ok", "alert", "unavailable"]
     assert [verdict.reasons[-1] for verdict in found] == [DEFAULTS_IN_USE] * 3
-    assert {verdict.calibration for verdict in found} == {UNCALIBRATED.name}
+    assert {verdict.calibration for verdict in found} == {NO_CALIBRATION}
     refused_too, _ = Monitor(white_mountains).judge(replace(honest, mode=MODES_708["weather"]), flying())
     assert refused_too.reasons[-1] == DEFAULTS_IN_USE
+
+
+def test_without_a_calibration_nothing_is_ok_that_t_or_the_unmatched_shares_contradict(
+    white_mountains: Terrain, honest: Scan
+) -> None:
+    """The defaults clip so wide that Q alone lets a quarter of grossly wrong pairs pass."""
+    part = np.arange(len(ANGLES))[:, None] % 4 == 0
+    torn = replace(honest, bins=np.where(part, moved(honest, 40).bins, honest.bins))
+    verdict, _ = judge(white_mountains, torn, calibration=None)
+    assert verdict.q is not None and verdict.threshold is not None and verdict.t_normalised is not None
+    assert verdict.q < verdict.threshold < verdict.t_normalised
+    assert verdict.verdict == "unavailable"
+    assert "without a calibration no ok: N T / sigma^2" in verdict.reasons[0]
+
+    alone = replace(honest, bins=np.where(np.arange(512) % 100 == 99, 0, honest.bins))
+    alone.bins[:, 4:] *= np.arange(508) // 5 % 2 == 1  # small shadows everywhere that no terrain casts
+    verdict, _ = judge(white_mountains, alone, calibration=None, settings=MonitorSettings(minimum_pairs=2, p_fa=0.01))
+    assert verdict.verdict != "ok"
+    assert any("unmatched share of radar shadows" in reason for reason in verdict.reasons)
 
 
 def test_too_few_pairs_are_unavailable_whatever_they_say(white_mountains: Terrain, honest: Scan) -> None:
