@@ -30,6 +30,7 @@ class Flight:
     terrain: Path
     p_fa: float
     calibration: Calibration | None = None
+    radar_profile: str | None = None  # instead of the one that the radar's payload has
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ def fly(flight: Flight) -> list[Judged]:
     rack = {
         "adapters": [{"name": "bridge", "source": "serial:none"}],
         "terrain": [flight.terrain],
-        "radar_profile": flight.scenario.radar.payload,
+        "radar_profile": flight.radar_profile or flight.scenario.radar.payload,
         "monitor": {"p_fa": flight.p_fa},
     }
     config = check_config(rack, "flight")

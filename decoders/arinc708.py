@@ -12,13 +12,15 @@ from decoders import formats as f
 from decoders import kernels708
 from decoders.profiles import Profile, load_profile
 
-__all__ = ["Profile", "Radials", "load_profile", "unpack"]
+__all__ = ["Profile", "Radials", "load_profile", "misread_bits", "unpack"]
 
 HEADER_FIELDS: Final = np.array(list(f.HEADER_708.values()), np.int64)
 # The label alone is sent most significant bit first.
 REVERSED: Final = np.array([int(f"{byte:08b}"[::-1], 2) for byte in range(256)], np.uint8)
 CODES: Final = np.arange(64)
 GAIN_DB: Final = np.where(f.GAIN_CALIBRATED == CODES, np.nan, np.abs(CODES) * f.GAIN_LSB_DB + 0.0)
+ENOUGH_LIT: Final = 1000  # codes above zero, of which a scan over land has ten times as many
+CLEARLY: Final = 1.1  # noise alone gives 1; radars over land give 1.3 and more, one way or the other
 RANGE_NM: Final = np.where(CODES == 0, f.RANGE_CODE_ZERO_NM, CODES * float(f.RANGE_LSB_NM))
 
 
@@ -51,6 +53,24 @@ def unpack(words: npt.ArrayLike, profile: str | Profile = "arinc708") -> Radials
     bins = np.empty((array.shape[0], settings.bins), np.uint8)
     kernels708.unpack(array, HEADER_FIELDS, settings.bits_per_bin, codes, bins)
     return _radials(dict(zip(f.HEADER_708, codes, strict=True)), bins, settings)
+
+
+def misread_bits(bins: npt.NDArray[np.uint8]) -> int | None:
+    """How many bits a bin seems to have, 3 or 6, if bins (n, M) were unpacked with the other number; else None.
+
+    Neighbours resemble each other. Cut every 3 bits, whole bins differ less from the next than from the one after;
+    halves of 6-bit bins differ more, a high half being like the next high half.
+    """
+    used = 6 if bins.max(initial=0) > 7 else 3
+    thirds = bins if used == 3 else np.stack([bins & 7, bins >> 3], axis=-1).reshape(len(bins), -1)
+    thirds = thirds.astype(np.int16)
+    if np.count_nonzero(thirds) < ENOUGH_LIT:
+        return None
+    next_one = np.abs(thirds[:, 1:] - thirds[:, :-1]).mean()
+    one_after = np.abs(thirds[:, 2:] - thirds[:, :-2]).mean()
+    if used == 3:
+        return 6 if next_one > CLEARLY * one_after else None
+    return 3 if one_after > CLEARLY * next_one else None
 
 
 def _radials(code: dict[str, npt.NDArray[np.uint16]], bins: npt.NDArray[np.uint8], settings: Profile) -> Radials:

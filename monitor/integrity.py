@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from decoders.arinc708 import misread_bits
 from decoders.formats import MODES_708
 from monitor import aircraft as state
 from monitor.aircraft import Aircraft, status_name
@@ -99,6 +100,8 @@ class Monitor:
             return f"scanner stuck: the scan angle did not change on {scan.repeated} of {len(scan.time_ns)} radials"
         if scan.faults:
             return f"radar reports faults: bits {scan.faults:07b} of the header's 18 to 24, the first at the right"
+        if bits := misread_bits(scan.bins):
+            return f"the range bins look like {bits} bits each: check radar_profile, or the channel's profile"
         return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm) if self.calibration else None
 
     def _point(

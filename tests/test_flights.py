@@ -1,6 +1,7 @@
 """Short simulated flights, byte for byte through decoders and monitor, on both terrains and all radar profiles."""
 
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
@@ -54,6 +55,18 @@ def test_a_calibration_for_another_radar_makes_the_verdict_unavailable() -> None
     (scan,) = fly(Flight(scenario, WHITE_MOUNTAINS, P_FA, load_calibration(CALIBRATION)))
     assert scan.verdict.verdict == UNAVAILABLE
     assert "256" in scan.verdict.reasons[0]
+
+
+@pytest.mark.parametrize(
+    ("payload", "profile", "bits"), [("arinc708", "wxr2100_6bit", 3), ("wxr2100_6bit", "arinc708", 6)]
+)
+def test_a_radar_read_with_the_wrong_profile_gives_no_verdict_and_says_what_its_bins_look_like(
+    payload: Literal["arinc708", "wxr2100_6bit"], profile: str, bits: int
+) -> None:
+    scenario = low_pass(Radar(payload=payload), sweeps=1)
+    (scan,) = fly(Flight(scenario, WHITE_MOUNTAINS, P_FA, radar_profile=profile))
+    assert scan.verdict.verdict == UNAVAILABLE
+    assert f"look like {bits} bits each: check radar_profile" in scan.verdict.reasons[0]
 
 
 def test_a_second_terrain_gives_verdicts_on_the_radials_that_stay_on_it() -> None:
