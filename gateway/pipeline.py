@@ -53,12 +53,12 @@ class Pipeline:
         self._counters: Counter[str] = Counter()
         self._now_ns = 0  # common time of the latest word
         self._now_host_ns: int | None = None  # and when that word was read
-        self._heard: dict[str, int] = {}  # adapter -> monotonic time of its last chunk
+        self._heard: dict[str, int] = {}  # adapter, or the radar -> monotonic time of its last packet
+        self._chunk: dict[str, int] = {}  # adapter -> monotonic time of its last bytes, whatever they were
         self._quiet: set[str] = set()
         self._users: dict[str, tuple[tuple[str, int], int]] = {}  # by role: adapter and channel, and when last heard
         self._unused: dict[tuple[str, int], str] = {}  # why a channel is not used, told already
         self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
-        self._scan_number = 0
         self._last: Record | None = None
         if before:
             self._counters = before._counters
@@ -103,8 +103,9 @@ class Pipeline:
             return
         link.counters["chunks"] += 1
         link.dropped(record.dropped_before)
-        yield from self._hear(record.adapter, record)
+        self._chunk[record.adapter] = record.stamp.monotonic_ns
         for packet in link.framer.feed(record.data):
+            yield from self._hear(record.adapter, record)
             link.count(packet)
             try:
                 yield from self._packet(link, packet, record)
@@ -115,7 +116,7 @@ class Pipeline:
         self._heard[source] = record.stamp.monotonic_ns
         if source in self._quiet:
             self._quiet.discard(source)
-            yield StatusEvent(record.stamp.utc_ns, record.sequence, source, "HEARD", "words come again")
+            yield StatusEvent(record.stamp.utc_ns, record.sequence, source, "HEARD", f"{_things(source)} come again")
 
     def _packet(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         if packet.time_ns > LATEST_DEVICE_NS:
@@ -202,7 +203,6 @@ class Pipeline:
 
     def _judge(self, scan: Scan, record: Record) -> Iterator[Event]:
         stamp = record.stamp.utc_ns, record.sequence
-        self._scan_number = scan.number
         yield ScanEvent(
             *stamp,
             scan=scan.number,
@@ -238,12 +238,19 @@ class Pipeline:
                     yield from self._judge(scan, record)
             if silent_ns > QUIET_NS and source not in self._quiet:
                 self._quiet.add(source)
-                reason = f"no words for {silent_ns / 1e9:.1f} s"
+                reason = self._quiet_reason(source, silent_ns, record)
                 yield StatusEvent(*stamp, source, "QUIET", reason)
                 if source == RADAR and self._monitor:
-                    silence = self._monitor.unavailable(self._scan_number, [f"radar: {reason}"])
+                    silence = self._monitor.unavailable(self._scans.skip(), [f"radar: {reason}"])
                     yield self._verdict(silence, self._monitor, record)
         yield self._state(record)
+
+    def _quiet_reason(self, source: str, silent_ns: int, record: Tick) -> str:
+        silent = f"no {_things(source)} for {silent_ns / 1e9:.1f} s"
+        bytes_ns = self._chunk.get(source)
+        if bytes_ns is None or record.stamp.monotonic_ns - bytes_ns > QUIET_NS:
+            return silent
+        return f"{silent}, though bytes come: check the baud rate and that the bridge speaks RackLink"
 
     def _state(self, record: Tick) -> StateEvent:
         silent_ns = record.stamp.monotonic_ns - (self._now_host_ns or record.stamp.monotonic_ns)
@@ -259,3 +266,7 @@ class Pipeline:
             newest = track.newest
             age_s[name] = (now_ns - newest[0]) / 1e9 if newest else None
         return StateEvent(record.stamp.utc_ns, record.sequence, values, validity, age_s)
+
+
+def _things(source: str) -> str:
+    return "words" if source == RADAR else "packets"

@@ -125,6 +125,8 @@ class Monitor:
             )
         if scan.missing:
             reasons.append(f"{scan.missing} radials are missing inside the sweep")
+        if scan.repeated:
+            reasons.append(f"the scan angle did not change on {scan.repeated} of {len(scan.time_ns)} radials")
         if scan.beyond_limits.any():
             reasons.append(f"{np.count_nonzero(scan.beyond_limits)} radials have attitude or tilt beyond limits")
         lat, lon, height, pitch, roll, heading = (values.value[usable] for values in found)

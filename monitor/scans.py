@@ -16,7 +16,8 @@ from monitor.track import wrap
 
 JUMP_DEG = 30.0  # farther than any step between neighbours, nearer than any fly-back
 SILENCE_NS = 2_000_000_000
-LONGEST_SWEEP = 4096  # radials; a stuck or spinning antenna must still give scans, and say so
+LONGEST_SWEEP = 4096  # radials; a spinning antenna must still give scans
+STUCK_NS = 2_000_000_000  # longer than any antenna rests where it turns back; a stuck one must be told in time
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class ScanBuilder:
         self._settings = (0.0, 0.0, 0, False, 0)  # tilt, range, mode, stabilised, bins
         self._faults = 0
         self._direction = 0.0
+        self._moved_ns = 0  # when the scan angle last changed
 
     def feed(self, time_ns: NDArray[np.int64], radials: Radials) -> Iterator[Scan]:
         """Take radials (n,) in order of time; give the scans that they complete."""
@@ -66,6 +68,8 @@ class ScanBuilder:
             )
             if self._rows and (settings != self._settings or self._turns(int(time_ns[k]), angles[k])):
                 yield self._close()
+            if not self._rows or angles[k] != self._rows[-1][1]:
+                self._moved_ns = int(time_ns[k])
             self._settings = settings
             self._faults |= int(radials.faults[k])
             self._rows.append((int(time_ns[k]), angles[k], bool(limits[k]), radials.bins[k]))
@@ -75,6 +79,11 @@ class ScanBuilder:
         if self._rows:
             yield self._close()
 
+    def skip(self) -> int:
+        """The number of a scan that never came: what is said of it must not pass for the scan before."""
+        self.number += 1
+        return self.number - 1
+
     def _turns(self, time_ns: int, angle_deg: float) -> bool:
         last_ns, last_deg = self._rows[-1][:2]
         step = (angle_deg - last_deg + 180) % 360 - 180
@@ -82,7 +91,8 @@ class ScanBuilder:
         if step and not turned:
             self._direction = step
         silent = not 0 <= time_ns - last_ns <= SILENCE_NS
-        return turned or abs(step) > JUMP_DEG or silent or len(self._rows) >= LONGEST_SWEEP
+        stuck = not step and time_ns - self._moved_ns > STUCK_NS
+        return turned or abs(step) > JUMP_DEG or silent or stuck or len(self._rows) >= LONGEST_SWEEP
 
     def _close(self) -> Scan:
         tilt, range_nm, mode, stabilised, _ = self._settings

@@ -212,13 +212,22 @@ def test_a_source_that_falls_quiet_is_told_once_and_again_when_it_is_heard() -> 
     feed(pipeline, raw(1, 0, bridge.heartbeat(0)))
     events = feed(pipeline, *(tick(k + 2, k + 1.0) for k in range(8)), raw(20, 9.5, bridge.heartbeat(9)))
     told = [(event.state, event.sequence, event.reason) for event in only(StatusEvent, events)]
-    assert told == [("QUIET", 7, "no words for 6.0 s"), ("HEARD", 20, "words come again")]
+    assert told == [("QUIET", 7, "no packets for 6.0 s"), ("HEARD", 20, "packets come again")]
 
 
 def test_a_source_that_was_opened_and_never_heard_is_told_to_be_quiet() -> None:
     pipeline = Pipeline(RACK, None)
     events = feed(pipeline, status(0, 0, "UP"), *(tick(k, k) for k in range(1, 9)))
     assert [event.adapter for event in only(StatusEvent, events) if event.state == "QUIET"] == ["bridge"]
+
+
+def test_a_line_that_gives_bytes_but_no_packets_is_told_to_be_quiet_with_what_to_check() -> None:
+    pipeline = Pipeline(RACK, None)
+    noise = (raw(2 * k, k + 0.5, bytes([0x5A, 0, 0xFF, 0]) * 20) for k in range(1, 9))
+    records = [record for k, chunk in enumerate(noise) for record in (tick(2 * k + 1, k + 1.0), chunk)]
+    events = feed(pipeline, status(0, 0, "UP"), *records)
+    (told,) = [event.reason for event in only(StatusEvent, events) if event.state == "QUIET"]
+    assert "though bytes come: check the baud rate" in told
 
 
 def test_a_silent_radar_ends_its_sweep_and_gives_an_unavailable_verdict(monitor: Monitor) -> None:
@@ -229,7 +238,8 @@ def test_a_silent_radar_ends_its_sweep_and_gives_an_unavailable_verdict(monitor:
         events += feed(pipeline, raw(2 * second, second, bridge.heartbeat(second)), tick(2 * second + 1, second + 0.1))
     assert [event.adapter for event in only(StatusEvent, events)] == ["radar"]
     assert len(only(ScanEvent, events)) == 1
-    _, silence = only(IntegrityEvent, events)
+    sweep_verdict, silence = only(IntegrityEvent, events)
+    assert silence.scan == sweep_verdict.scan + 1
     assert silence.verdict == "unavailable"
     assert any("no words for" in reason for reason in silence.reasons)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from decoders.arinc708 import Radials
-from monitor.scans import LONGEST_SWEEP, Scan, ScanBuilder
+from monitor.scans import LONGEST_SWEEP, STUCK_NS, Scan, ScanBuilder
 
 MS = 1_000_000
 STEP_MS = 20
@@ -160,9 +160,29 @@ def test_blocks_of_any_size_give_the_same_scans() -> None:
     assert [scan.time_ns.tolist() for scan in one_by_one.scans] == [scan.time_ns.tolist() for scan in whole]
 
 
-def test_a_stuck_scanner_still_gives_scans_that_say_so() -> None:
-    scans = Sweeps().feed(radials([12.0] * (LONGEST_SWEEP + 10))).finish()
-    assert [scan.scan_angle_deg.size for scan in scans] == [LONGEST_SWEEP, 10]
-    assert [scan.repeated for scan in scans] == [LONGEST_SWEEP - 1, 9]
-    assert scans[0].missing == 0
-    assert scans[0].sector_deg == (12, 12)
+def test_a_stuck_scanner_gives_a_scan_every_two_seconds_that_says_so() -> None:
+    rows = 2 * STUCK_NS // (STEP_MS * MS) + 30
+    scans = Sweeps().feed(radials([12.0] * rows)).finish()
+    per_scan = STUCK_NS // (STEP_MS * MS) + 1
+    assert [scan.scan_angle_deg.size for scan in scans] == [per_scan, per_scan, 28]
+    assert all(scan.repeated == scan.scan_angle_deg.size - 1 for scan in scans)
+
+
+def test_a_rest_where_the_antenna_turns_back_is_no_stuck_scanner() -> None:
+    rest = [60.0] * (STUCK_NS // (STEP_MS * MS) // 2)
+    scans = Sweeps().feed(radials([*np.arange(0.0, 60.0), *rest, *np.arange(59.0, 0.0, -1)])).finish()
+    assert len(scans) == 2
+
+
+def test_an_antenna_that_spins_gives_scans_of_bounded_length() -> None:
+    angles = np.arange(2 * LONGEST_SWEEP) * 0.5
+    scans = Sweeps().feed(radials(list((angles + 180) % 360 - 180))).finish()
+    assert [scan.scan_angle_deg.size for scan in scans] == [LONGEST_SWEEP] * 2
+
+
+def test_a_scan_that_never_came_has_a_number_of_its_own() -> None:
+    sweeps = Sweeps().feed(radials([0, 1, 2]))
+    (first,) = sweeps.finish()
+    assert sweeps.builder.skip() == first.number + 1
+    sweeps.feed(radials([0, 1, 2]))
+    assert [scan.number for scan in sweeps.finish()] == [0, 2]
