@@ -17,6 +17,7 @@ FLAG_NAMES = {
     f.FLAG_WORD_LENGTH: "word_length_error",
     f.FLAG_SYNC: "sync_error",
 }
+SPOILT = f.FLAG_CODING | f.FLAG_WORD_LENGTH | f.FLAG_SYNC  # words whose bits cannot be trusted
 
 
 @dataclass(frozen=True)

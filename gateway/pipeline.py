@@ -14,14 +14,13 @@ from decoders import formats as f
 from decoders.racklink import MalformedBody, Packet, heartbeat, hello, radar_word, words429
 from gateway.config import RackConfig
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
-from gateway.link import Channel429, Channel708, Link
+from gateway.link import SPOILT, Channel429, Channel708, Link
 from gateway.records import Note, Raw, Record, Status, Tick
 from gateway.timebase import Timebase
 from monitor.aircraft import Aircraft, status_name
 from monitor.integrity import Comparison, Monitor, Verdict
 from monitor.scans import SILENCE_NS, Scan, ScanBuilder
 
-SPOILT = f.FLAG_CODING | f.FLAG_WORD_LENGTH | f.FLAG_SYNC  # words whose bits cannot be trusted
 QUIET_NS = 5_000_000_000
 LATEST_DEVICE_NS = 1 << 62  # far beyond any clock, and far from overflow
 

@@ -9,7 +9,7 @@ from decoders import formats as f
 from decoders.racklink import MalformedBody, Packet, hello, radar_word, words429
 from gateway.config import RackConfig
 from gateway.console import clock
-from gateway.link import Channel429, Channel708, Link
+from gateway.link import FLAG_NAMES, SPOILT, Channel429, Channel708, Link
 from gateway.records import Raw, Record
 
 
@@ -21,14 +21,15 @@ def lines(records: Iterable[Record], config: RackConfig) -> Iterator[str]:
             continue
         link = links[record.adapter]
         for packet in link.framer.feed(record.data):
+            flags = "".join(f"  {name}" for bit, name in FLAG_NAMES.items() if packet.flags & bit)
             place = f"({clock(record.stamp.utc_ns)}) {record.adapter} {packet.channel:3d}"
             try:
                 if packet.type == f.HELLO:
                     link.hello(hello(packet))
                 elif packet.type == f.WORDS_429:
-                    yield from (f"{place}  429  {text}" for text in _words(link, packet))
+                    yield from (f"{place}  429  {text}{flags}" for text in _words(link, packet))
                 elif packet.type == f.WORD_708:
-                    yield f"{place}  708  {_radar(link, packet)}"
+                    yield f"{place}  708  {_radar(link, packet)}{flags}"
             except MalformedBody as error:
                 yield f"{place}  malformed: {error}"
 
@@ -36,8 +37,9 @@ def lines(records: Iterable[Record], config: RackConfig) -> Iterator[str]:
 def _words(link: Link, packet: Packet) -> Iterator[str]:
     block = words429(packet)
     channel = link.channels.get(packet.channel)
-    if not isinstance(channel, Channel429):
-        yield from (f"{word:08x}  channel without definitions" for word in block.words.tolist())
+    if not isinstance(channel, Channel429) or packet.flags & SPOILT:
+        why = "not decoded" if packet.flags & SPOILT else "channel without definitions"
+        yield from (f"{word:08x}  {why}" for word in block.words.tolist())
         return
     values = arinc429.decode(block.words, channel.definitions, channel.orientation)
     for k, word in enumerate(block.words.tolist()):
@@ -53,7 +55,7 @@ def _radar(link: Link, packet: Packet) -> str:
     word = radar_word(packet)
     channel = link.channels.get(packet.channel)
     head = word.data[: f.HEADER_708_BYTES].hex()
-    if not isinstance(channel, Channel708) or word.bit_count != f.WORD_708_BITS:
+    if not isinstance(channel, Channel708) or word.bit_count != f.WORD_708_BITS or packet.flags & SPOILT:
         return f"{head}...  {word.bit_count} bits, not decoded"
     radial = arinc708.unpack(np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile)
     lit = np.count_nonzero(radial.bins)

@@ -89,7 +89,7 @@ class Monitor:
         comparison, lost = self._compare(scan, chosen[usable], pointing)
         if lost:
             reasons.append(f"{lost} radials leave the terrain or cross voids")
-        return self._decide(scan, comparison, reasons), comparison
+        return self._decide(scan, comparison, self._buried(pointing), reasons), comparison
 
     def _refusal(self, scan: Scan) -> str | None:
         if scan.mode != MODES_708["map"]:
@@ -166,10 +166,11 @@ class Monitor:
             _share(*unmatched_share(predicted, seen, radar)),
         ), int(np.count_nonzero(void))
 
-    def _decide(self, scan: Scan, comparison: Comparison, reasons: list[str]) -> Verdict:
+    def _decide(self, scan: Scan, comparison: Comparison, doubts: list[str], reasons: list[str]) -> Verdict:
         s, d = self.settings, comparison.disparities
         c = self.calibration or uncalibrated(scan.bins.shape[1])
         n = len(d)
+        reasons = [*doubts, *reasons]
         if n < s.pairs_needed:
             few = f"{n} pairs of shadows, {s.pairs_needed} needed"
             return self.unavailable(scan.number, [few, *reasons], comparison)
@@ -186,12 +187,16 @@ class Monitor:
             )
             return self.unavailable(scan.number, [blind, *reasons], comparison)
         if value > limit:
+            verdict = ALERT
             reasons.insert(0, f"{'Q' if s.method == 'robust' else 'N T / sigma^2'} {value:.1f} exceeds {limit:.1f}")
-        doubts = self._doubts(comparison, t_normalised)
+        else:
+            contradictions = self._contradictions(comparison, t_normalised)
+            verdict = UNAVAILABLE if doubts or contradictions else OK
+            reasons = [*contradictions, *reasons]
         return Verdict(
             scan=scan.number,
-            verdict=ALERT if value > limit else UNAVAILABLE if doubts else OK,
-            reasons=tuple(doubts + reasons + self._caveats()),
+            verdict=verdict,
+            reasons=tuple(reasons + self._caveats()),
             n_pairs=n,
             t_bins2=statistic(d),
             t_normalised=t_normalised,
@@ -225,7 +230,13 @@ class Monitor:
             calibration=self.calibration.name if self.calibration else NO_CALIBRATION,
         )
 
-    def _doubts(self, comparison: Comparison, t_normalised: float) -> list[str]:
+    def _buried(self, pointing: Pointing) -> list[str]:
+        """What forbids an ok where the aircraft is under the ground, as terrain in feet or a wrong datum puts it."""
+        ground_m = self.terrain.elevation(pointing.latitude_deg, pointing.longitude_deg)
+        below_m = float(np.nanmax(ground_m - pointing.height_m, initial=0.0))
+        return [f"the aircraft is {below_m:.0f} m below the stored terrain: check unit and datum"] if below_m else []
+
+    def _contradictions(self, comparison: Comparison, t_normalised: float) -> list[str]:
         """What forbids an ok that rests on stated defaults: they may be too wide for this radar, and hide an error."""
         if self.calibration:
             return []

@@ -22,6 +22,7 @@ from rasterio.vrt import WarpedVRT
 
 MOST_POSTS = 400_000_000  # 1.6 GB; files far apart would fill the memory with nothing
 WGS84 = CRS.from_epsg(4326)
+LOWEST_M, HIGHEST_M = -500.0, 9000.0  # no ground on Earth lies outside
 ALIGNMENT_POSTS = 0.05  # files whose posts miss a common grid by more are refused: resampling is not ours to hide
 
 
@@ -88,7 +89,12 @@ def _read(path: Path) -> Grid:
 
 
 def _grid(source: rasterio.DatasetReader) -> Grid:
+    if source.count != 1:
+        raise TerrainError(f"{source.name} has {source.count} bands: a terrain file has one, of heights in metres")
     height_m = source.read(1, masked=True).astype(np.float32).filled(np.nan)
+    if np.any((height_m < LOWEST_M) | (height_m > HIGHEST_M)):
+        extremes = f"{np.nanmin(height_m):.0f} to {np.nanmax(height_m):.0f}"
+        raise TerrainError(f"{source.name} holds heights of {extremes} m: mark voids as nodata, convert to metres")
     t = source.transform
     if t.b or t.d or t.a <= 0 or t.e >= 0:
         raise TerrainError(f"{source.name} is not a north-up raster: warp it with gdalwarp")

@@ -27,6 +27,7 @@ MS = 1_000_000
 ANGLES = np.arange(-90.0, 91.0, 3.0)
 HERE = {"latitude_deg": 44.37514, "longitude_deg": -71.71874, "height_m": 761.0, "heading_deg": 197.6}
 TILT_DEG = -2.0
+FAN_DEG = Beam().azimuth_span * Beam().width_deg
 NO_COMPUTED_DATA = 1
 CALIBRATED = Calibration(
     name="test radar",
@@ -314,9 +315,17 @@ def test_radials_that_leave_the_terrain_are_counted(white_mountains: Terrain, ho
     """9.3 km from the western border of the cell, radials of 18.5 km leave it on one side."""
     longitude = float(Geod(ellps="WGS84").fwd(-72.0, HERE["latitude_deg"], 90, 9_300)[0])
     verdict, comparison = judge(white_mountains, honest, flying(longitude_deg=longitude, heading_deg=180.0))
-    lost = int(np.sum(18_520 * np.sin(np.radians(ANGLES + 1.75)) > 9_300))  # the fan's edge leaves first
+    lost = int(np.sum(18_520 * np.sin(np.radians(ANGLES + FAN_DEG)) > 9_300))  # the fan's edge leaves first
     assert len(comparison.scan_angle_deg) == 61 - lost
     assert f"{lost} radials leave the terrain or cross voids" in verdict.reasons
+
+
+def test_an_aircraft_below_the_stored_terrain_is_never_ok(white_mountains: Terrain, honest: Scan) -> None:
+    grid = white_mountains.grid
+    feet = Terrain(grid._replace(height_m=grid.height_m / np.float32(0.3048)), [], "")
+    verdict, _ = judge(feet, honest, settings=MonitorSettings(minimum_pairs=2, p_fa=0.1))
+    assert verdict.verdict != "ok"
+    assert any("below the stored terrain" in reason for reason in verdict.reasons)
 
 
 def test_beyond_70_degrees_of_latitude_the_monitor_declines(white_mountains: Terrain, honest: Scan) -> None:

@@ -10,6 +10,7 @@ from pyproj import Transformer
 from rasterio.transform import Affine
 from rasterio.windows import Window
 
+from monitor import terrain
 from monitor.terrain import Grid, Terrain, TerrainError, open_terrain
 
 
@@ -179,6 +180,35 @@ def test_a_raster_that_is_not_north_up_is_named_with_the_mend(tmp_path: Path) ->
     path = write(tmp_path / "turned.tif", np.ones((3, 3), np.int16), turned)
     with pytest.raises(TerrainError, match=r"turned\.tif is not a north-up raster.*gdalwarp"):
         open_terrain(path)
+
+
+@pytest.mark.parametrize("heights", [[[100, 30_000], [0, 0]], [[-2000, 0], [0, 0]]])
+def test_heights_that_no_ground_has_are_refused_with_the_mend(tmp_path: Path, heights: list[list[int]]) -> None:
+    path = write(tmp_path / "noise.tif", np.array(heights, np.int16), north_up(7, 45, 0.25))
+    with pytest.raises(TerrainError, match=r"noise.tif holds heights of .* m: mark voids as nodata"):
+        open_terrain(path)
+
+
+def test_a_picture_is_no_terrain(tmp_path: Path) -> None:
+    path = tmp_path / "map.tif"
+    with rasterio.open(
+        path, "w", driver="GTiff", height=2, width=2, count=3, dtype="uint8", crs="EPSG:4326",
+        transform=north_up(7, 45, 0.25),
+    ) as file:  # fmt: skip
+        file.write(np.zeros((3, 2, 2), np.uint8))
+    with pytest.raises(TerrainError, match="has 3 bands"):
+        open_terrain(path)
+
+
+def test_files_far_apart_are_refused_before_they_fill_the_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(terrain, "MOST_POSTS", 1000)
+    heights = np.zeros((4, 4), np.int16)
+    near = write(tmp_path / "near.tif", heights, north_up(7, 45, 0.25))
+    far = write(tmp_path / "far.tif", heights, north_up(107, 45, 0.25))
+    with pytest.raises(TerrainError, match="span 4 x 404 posts: name only those that the flight needs"):
+        open_terrain([near, far])
 
 
 def test_no_file_at_all_is_refused() -> None:
