@@ -26,7 +26,7 @@ def test_the_flags_of_the_bridge_stand_behind_every_word_of_their_packet() -> No
     bridge = Bridge()
     found = dumped(bridge.hello(), bridge.words(GNSS, 0.0, [LATITUDE, LATITUDE], f.FLAG_PARITY))
     assert len(found) == 2
-    assert all("GNSS latitude: 44.4" in line and line.endswith(" deg  parity_error") for line in found)
+    assert all("GNSS latitude: 44.39" in line and line.endswith(" deg  parity_error") for line in found)
 
 
 def test_words_whose_bits_cannot_be_trusted_are_shown_and_not_decoded() -> None:
