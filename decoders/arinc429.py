@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from decoders import kernels429
-from decoders.definitions import Definition, Definitions, load_definitions
+from decoders.definitions import CHARACTER_BITS, Definition, Definitions, load_definitions
 from decoders.formats import ORIENTATIONS, SSM_TABLES
 from decoders.results429 import Status, Values429, Words429
 
-__all__ = ["Status", "Values429", "Words429", "decode", "join_position", "load_definitions", "unpack"]
+__all__ = ["Status", "Values429", "Words429", "decode", "field", "join_position", "load_definitions", "text", "unpack"]
 
 JoinRule = Literal["concatenate", "toward_zero"]
 JOIN_RULES: Final = ("concatenate", "toward_zero")
@@ -29,6 +29,8 @@ ENCODING_CODES: Final = {
     "bcd": kernels429.BCD,
     "time": kernels429.TIME,
     "date": kernels429.DATE,
+    "clock": kernels429.CLOCK,
+    "iso5": kernels429.TEXT,
 }
 
 
@@ -54,8 +56,10 @@ def decode(words: npt.ArrayLike, definitions: Definitions, orientation: str = "w
     """The values of words (n,) u4 by a set of label definitions; a word is never repaired, and never left out.
 
     "bnr" is two's complement; "bcd" takes its sign from the SSM; "disc" is its bits as an integer; "time" (label 150)
-    is seconds of the day; "date" (label 260) is days since 2000-01-01. BCD digits above 9, times after 23:59:59 and
-    dates that do not exist are INVALID_DATA. A value is integer x LSB rounded once, so exact for every binary LSB.
+    is seconds of the day, 86400 in a leap second; "clock" (label 125) minutes of the day; "date" (label 260) days since
+    2000-01-01; "iso5" its characters as an integer. BCD digits above 9, times after 23:59:60, dates that do not exist
+    and characters that cannot be printed are INVALID_DATA. A value is integer x LSB rounded once, so exact for every
+    binary LSB.
 
     Raises ValueError for words that are no row of 32-bit unsigned integers, or an unknown orientation.
     """
@@ -87,6 +91,23 @@ def join_position(
     degrees = np.empty(coarse_words.size)
     kernels429.join_position(coarse_words, fine_words, rule == "toward_zero", degrees)
     return degrees
+
+
+def field(words: npt.ArrayLike, definition: Definition, name: str) -> npt.NDArray[np.uint32]:
+    """The discrete bits `name` of a label's definition, u4 (n,), from raw words (n,) u4 of that label.
+
+    Status is not looked at. Raises KeyError for a field that the definition does not have.
+    """
+    first, last = definition.fields[name]
+    return _words(words) >> np.uint32(first - 1) & np.uint32((1 << last - first + 1) - 1)
+
+
+def text(words: npt.ArrayLike, definition: Definition) -> list[str]:
+    """What each of the raw words (n,) u4 of an "iso5" label says, fillers left out; status is not looked at."""
+    first, last = definition.bits
+    shifts = range(first - 1, last, CHARACTER_BITS)
+    mask = (1 << CHARACTER_BITS) - 1
+    return ["".join(chr(word >> shift & mask) for shift in shifts).replace("\0", "") for word in _words(words).tolist()]
 
 
 def _words(words: npt.ArrayLike) -> npt.NDArray[np.uint32]:

@@ -4,7 +4,9 @@ A label means different things on different equipment, so definitions come in na
 Nothing here packs or unpacks a word: decoders and simulators read the same rows and share no more than them.
 """
 
+import re
 import tomllib
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -18,7 +20,15 @@ LABELS_FILE: Final = Path(__file__).with_name("labels.toml")
 EXACT: Final = 2**53  # integers up to here are exact as floats, so that a value is rounded once at most
 
 # The set for an equipment that a bridge announces by the low byte of its id.
-SET_OF_EQUIPMENT: Final = {0x0B: "gnss_743a", 0x04: "iru_704", 0x06: "adc_706", 0x07: "ra_707", 0x38: "adiru_738"}
+SET_OF_EQUIPMENT: Final = {
+    0x04: "iru_704",
+    0x05: "ahrs_705",
+    0x06: "adc_706",
+    0x07: "ra_707",
+    0x0B: "gnss_743a",
+    0x31: "clock_731",
+    0x38: "adiru_738",
+}
 
 
 class Encoding(NamedTuple):
@@ -37,9 +47,13 @@ ENCODINGS: Final = {
     "disc": Encoding(frozenset(), "disc"),
     "time": Encoding(frozenset(), "bnr", (12, 28), "s"),
     "date": Encoding(frozenset(), "bcd", units="days since 2000-01-01"),
+    "clock": Encoding(frozenset(), "bcd", (11, 28), "min"),
+    "iso5": Encoding(frozenset({"bits"}), "disc", units="text"),
 }
+LSB_OF_CLOCK: Final = Fraction(1, 10)
+CHARACTER_BITS: Final = 7  # of ISO alphabet 5
 ROW_NEEDS: Final = frozenset({"label", "name", "encoding", "source", "confidence"})
-ROW_MAY_HAVE: Final = frozenset({"ssm", "fields"})
+ROW_MAY_HAVE: Final = frozenset({"ssm", "fields", "fine_of", "positive", "interval_ms"})
 SET_KEYS: Final = frozenset({"equipment_id", "extends", "rows"})
 
 
@@ -51,7 +65,8 @@ class DefinitionError(ValueError):
 class Definition:
     """One label. `bits` are the first and last of the value, without the sign bit (29) of a "bnr" row.
 
-    `value = integer * lsb`, in `units`, exactly. `fields` are the discrete bits beside or, in a "disc" row, inside the
+    `value = integer * lsb`, in `units`, exactly; an "iso5" row is text, 7 bits a character, the first one lowest.
+    `fields` are the discrete bits beside or, in a "disc" row, inside the
     value: name -> first and last bit. `ssm` names a row of `decoders.formats.SSM_TABLES`.
     """
 
@@ -66,6 +81,9 @@ class Definition:
     fields: Mapping[str, tuple[int, int]]
     source: str
     confidence: str
+    positive: str = ""  # the sense of a positive value: "north", "nose up"
+    fine_of: int | None = None  # the label whose remainder this word is
+    interval_ms: tuple[float, float | None] | None = None  # between two words: shortest, and longest if stated
 
     @property
     def has_sdi(self) -> bool:
@@ -93,10 +111,15 @@ def load_definitions(name_or_path: str | Path) -> Definitions:
     path = Path(name_or_path)
     if path.suffix != ".toml":
         return _named(str(name_or_path))
-    tables = _read(path)
-    if len(tables) != 1:
-        raise DefinitionError(f"{path} has {len(tables)} sets: put exactly one in a definition file")
-    return _set(path, next(iter(tables)), tables)
+    file = _read(path)
+    if len(file.tables) != 1:
+        raise DefinitionError(f"{path} has {len(file.tables)} sets: put exactly one in a definition file")
+    return _set(file, next(iter(file.tables)))
+
+
+def set_names() -> tuple[str, ...]:
+    """The names of the built-in sets."""
+    return tuple(_built_in().tables)
 
 
 def for_equipment(equipment_id_low_byte: int) -> str | None:
@@ -104,36 +127,71 @@ def for_equipment(equipment_id_low_byte: int) -> str | None:
     return SET_OF_EQUIPMENT.get(equipment_id_low_byte)
 
 
+class _File(NamedTuple):
+    """A definition file: its tables, and its text for the line of a row."""
+
+    path: Path
+    tables: dict[str, Any]
+    text: str
+
+    def where(self, name: str, label: object, occurrence: int = 0) -> str:
+        """File and line of a row, as editors take it, its set and its label."""
+        section = re.search(rf"^\[{re.escape(name)}\]\s*$(.*?)(?=^\[\w+\]\s*$|\Z)", self.text, re.MULTILINE | re.DOTALL)
+        start, end = section.span(1) if section else (0, len(self.text))
+        rows = list(re.finditer(rf"label\s*=\s*[\"']?{re.escape(str(label))}\b", self.text[start:end]))
+        line = self.text.count("\n", 0, start + rows[occurrence].start()) + 1 if occurrence < len(rows) else 1
+        return f"{self.path}:{line} [{name}] label {label}"
+
+
+@cache
+def _built_in() -> _File:
+    file = _read(LABELS_FILE)
+    defined: dict[tuple[int, str], str] = {}
+    for name, table in file.tables.items():
+        for row in [] if "extends" in table else table["rows"]:
+            other = defined.setdefault((table["equipment_id"], row["label"]), name)
+            if other != name:
+                where = file.where(name, row["label"])
+                raise DefinitionError(f"{where}: set {other} defines it for the same equipment: extend that set")
+    return file
+
+
 def _named(name: str) -> Definitions:
-    tables = _read(LABELS_FILE)
-    if name not in tables:
-        raise ValueError(f"no definitions {name!r}: name one of {', '.join(tables)} or a .toml file")
-    return _set(LABELS_FILE, name, tables)
+    file = _built_in()
+    if name not in file.tables:
+        raise ValueError(f"no definitions {name!r}: name one of {', '.join(file.tables)} or a .toml file")
+    return _set(file, name)
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Path) -> _File:
+    text = path.read_text("utf-8")
     # Decimal fractions are kept exact: 0.1 and 4.096 have no exact float.
     try:
-        return tomllib.loads(path.read_text("utf-8"), parse_float=Fraction)
+        return _File(path, tomllib.loads(text, parse_float=Fraction), text)
     except tomllib.TOMLDecodeError as error:
         raise DefinitionError(f"{path} is no TOML: {error}") from error
 
 
-def _set(path: Path, name: str, tables: dict[str, Any]) -> Definitions:
-    where = f"{path.name} [{name}]"
-    table = tables[name]
+def _set(file: _File, name: str) -> Definitions:
+    table = file.tables[name]
     if not isinstance(table, dict) or not {"equipment_id", "rows"} <= table.keys() <= SET_KEYS:
-        raise DefinitionError(f"{where}: a set has equipment_id, rows and perhaps extends, nothing else")
+        raise DefinitionError(f"{file.path} [{name}]: a set has equipment_id, rows and perhaps extends, nothing else")
     labels: dict[int, Definition] = {}
+    written: Counter[object] = Counter()
     for row in table["rows"]:
         if not isinstance(row, dict):
-            raise DefinitionError(f"{where}: {row!r} is no row; write {{ label = ..., name = ..., ... }}")
-        definition = _definition(f"{where} label {row.get('label', '?')}", row)
+            raise DefinitionError(f"{file.path} [{name}]: {row!r} is no row; write {{ label = ..., name = ..., ... }}")
+        where = file.where(name, row.get("label", "?"), written[row.get("label")])
+        written[row.get("label")] += 1
+        definition = _definition(where, row)
         if definition.label in labels:
-            raise DefinitionError(f"{where} label {row['label']}: defined twice")
+            raise DefinitionError(f"{where}: defined twice")
         labels[definition.label] = definition
     inherited = _named(table["extends"]).labels if "extends" in table else {}
-    return Definitions(name, table["equipment_id"], {**inherited, **labels})
+    whole = {**inherited, **labels}
+    for definition in labels.values():
+        _check_fine(file.where(name, f"{definition.label:03o}"), definition, whole)
+    return Definitions(name, table["equipment_id"], whole)
 
 
 def _definition(where: str, row: dict[str, Any]) -> Definition:
@@ -147,13 +205,16 @@ def _definition(where: str, row: dict[str, Any]) -> Definition:
             name=row["name"],
             encoding=row["encoding"],
             bits=_bits(row["bits"]) if "bits" in row else encoding.bits,
-            lsb=_exact(row.get("lsb", 1)),
+            lsb=_exact(row.get("lsb", LSB_OF_CLOCK if row["encoding"] == "clock" else 1)),
             range=_exact(row["range"]) if "range" in row else None,
             units=row.get("units", encoding.units),
             ssm=row.get("ssm", encoding.ssm),
             fields={name: _bits(bits) for name, bits in row.get("fields", {}).items()},
             source=row["source"],
             confidence=row["confidence"],
+            positive=row.get("positive", ""),
+            fine_of=int(row["fine_of"], 8) if "fine_of" in row else None,
+            interval_ms=_interval(row["interval_ms"]) if "interval_ms" in row else None,
         )
     except (AttributeError, TypeError, ValueError, ZeroDivisionError) as error:
         raise DefinitionError(f"{where}: {error}") from error
@@ -166,6 +227,13 @@ def _bits(bits: int | list[int]) -> tuple[int, int]:
     if not 9 <= first <= last <= 29:
         raise ValueError(f"bits {first} to {last} are not data bits, which are 9 to 29 in rising order")
     return first, last
+
+
+def _interval(interval: float | Fraction | list[float | Fraction]) -> tuple[float, float | None]:
+    shortest, longest = interval if isinstance(interval, list) else (interval, None)
+    if shortest < 0 or (longest is not None and longest <= shortest):
+        raise ValueError(f"interval_ms {interval}: state the shortest and the longest, or the shortest alone")
+    return float(shortest), None if longest is None else float(longest)
 
 
 def _exact(number: int | str | Fraction) -> Fraction:
@@ -192,6 +260,8 @@ def _check(where: str, definition: Definition) -> None:
         raise DefinitionError(f"{where}: a label is octal 000 to 377")
     if definition.ssm not in SSM_TABLES:
         raise DefinitionError(f"{where}: unknown ssm {definition.ssm!r}, use one of {', '.join(SSM_TABLES)}")
+    if definition.encoding == "iso5" and width % CHARACTER_BITS:
+        raise DefinitionError(f"{where}: {width} bits do not hold whole characters of {CHARACTER_BITS}")
     if definition.encoding == "bnr" and last != 28:
         raise DefinitionError(f"{where}: bnr bits end at 28, below the sign in bit 29")
     if definition.range is not None and definition.lsb != definition.range / 2**width:
@@ -199,6 +269,16 @@ def _check(where: str, definition: Definition) -> None:
     if definition.lsb <= 0 or max(definition.lsb.numerator << width, definition.lsb.denominator) > EXACT:
         raise DefinitionError(f"{where}: the LSB {definition.lsb} is not positive or too fine to be exact")
     _check_overlap(where, definition)
+
+
+def _check_fine(where: str, fine: Definition, labels: Mapping[int, Definition]) -> None:
+    if fine.fine_of is None:
+        return
+    coarse = labels.get(fine.fine_of)
+    if coarse is None or fine.encoding != "bnr_unsigned" or (fine.range, fine.units) != (coarse.lsb, coarse.units):
+        raise DefinitionError(
+            f"{where}: no remainder of label {fine.fine_of:03o}: its range must be that label's LSB, unsigned"
+        )
 
 
 def _check_overlap(where: str, definition: Definition) -> None:

@@ -42,8 +42,16 @@ SSM_TABLES: Final = {
 }
 SSM_BCD_MINUS: Final = 3
 
-# Label 150, UTC: name -> first bit, width, largest value.
-TIME_FIELDS: Final = {"hours": (24, 5, 23), "minutes": (18, 6, 59), "seconds": (12, 6, 59)}
+# Label 150, UTC: name -> first bit, width, largest value. Second 60 is a leap second, at 23:59 alone.
+TIME_FIELDS: Final = {"hours": (24, 5, 23), "minutes": (18, 6, 59), "seconds": (12, 6, 60)}
+# Label 125, UTC in tenths of a minute: BCD digit -> first bit, width.
+CLOCK_DIGITS: Final = {
+    "hour_tens": (27, 2),
+    "hour_units": (23, 4),
+    "minute_tens": (19, 4),
+    "minute_units": (15, 4),
+    "minute_tenths": (11, 4),
+}
 # Label 260, date: BCD digit -> first bit, width. The year is modulo 100, read as 2000 to 2099.
 DATE_DIGITS: Final = {
     "day_tens": (28, 2),

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from decoders.formats import DATE_DIGITS, SSM_BCD_MINUS, TIME_FIELDS
+from decoders.definitions import CHARACTER_BITS
+from decoders.formats import CLOCK_DIGITS, DATE_DIGITS, SSM_BCD_MINUS, TIME_FIELDS
 from decoders.results429 import Status, Values429, Words429
 
 Int = int | np.int64
@@ -20,6 +21,8 @@ UNSIGNED: Final = 2
 BCD: Final = 3
 TIME: Final = 4
 DATE: Final = 5
+CLOCK: Final = 6
+TEXT: Final = 7
 
 # Columns of the label table; the value is integer * numerator / denominator.
 ENCODING: Final = 0
@@ -38,7 +41,10 @@ UNKNOWN_LABEL: Final = int(Status.UNKNOWN_LABEL)
 INVALID_DATA: Final = int(Status.INVALID_DATA)
 
 TIME_LIMITS: Final = tuple(TIME_FIELDS.values())
-DIGITS: Final = tuple(DATE_DIGITS.values())
+DATE_PARTS: Final = tuple(DATE_DIGITS.values())
+CLOCK_PARTS: Final = tuple(CLOCK_DIGITS.values())
+LEAP_SECOND: Final = 60
+DAY_S: Final = 86_400
 MONTH_DAYS: Final = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 
 
@@ -128,11 +134,19 @@ def _integer(word: Int, row: npt.NDArray[np.int64]) -> Int:
         magnitude = _decimal(raw)
         minus = row[SSM_SIGN] and _bits(word, 30, 2) == SSM_BCD_MINUS
         return -magnitude if minus and magnitude != INVALID else magnitude
+    return raw if encoding == UNSIGNED else _composed(word, encoding, raw)
+
+
+@njit(cache=True)
+def _composed(word: Int, encoding: Int, raw: Int) -> Int:
+    """The value of a word whose data are several numbers or characters."""
     if encoding == TIME:
         return _seconds(word)
     if encoding == DATE:
         return _days(word)
-    return raw
+    if encoding == CLOCK:
+        return _tenths(word)
+    return _characters(raw) if encoding == TEXT else raw
 
 
 @njit(cache=True)
@@ -157,26 +171,34 @@ def _decimal(raw: Int) -> Int:
 @njit(cache=True)
 def _seconds(word: Int) -> Int:
     total: Int = 0
+    part: Int = 0
     for first, width, largest in TIME_LIMITS:
         part = _bits(word, first, width)
         if part > largest:
             return INVALID
         total = total * 60 + part
-    return total
+    return INVALID if part == LEAP_SECOND and total != DAY_S else total
+
+
+@njit(cache=True)
+def _digits(word: Int, places: tuple[tuple[int, int], ...]) -> Int:
+    """The decimal number of BCD digits that do not lie nibble by nibble."""
+    number: Int = 0
+    for first, width in places:
+        digit = _bits(word, first, width)
+        if digit > 9:
+            return INVALID
+        number = number * 10 + digit
+    return number
 
 
 @njit(cache=True)
 def _days(word: Int) -> Int:
     """Days since 2000-01-01, years 2000 to 2099, in which each fourth is a leap year."""
-    number: Int = 0
-    for first, width in DIGITS:
-        digit = _bits(word, first, width)
-        if digit > 9:
-            return INVALID
-        number = number * 10 + digit
+    number = _digits(word, DATE_PARTS)
     day, month, year = number // 10000, number // 100 % 100, number % 100
     leap = year % 4 == 0
-    if not 1 <= month <= 12:
+    if number == INVALID or not 1 <= month <= 12:
         return INVALID
     if not 1 <= day <= MONTH_DAYS[month - 1] + (leap and month == 2):
         return INVALID
@@ -184,3 +206,25 @@ def _days(word: Int) -> Int:
     for earlier in range(month - 1):
         days += MONTH_DAYS[earlier]
     return days
+
+
+@njit(cache=True)
+def _tenths(word: Int) -> Int:
+    """Tenths of a minute since midnight."""
+    number = _digits(word, CLOCK_PARTS)
+    hours, tenths = number // 1000, number % 1000
+    if number == INVALID or hours > 23 or tenths > 599:
+        return INVALID
+    return hours * 600 + tenths
+
+
+@njit(cache=True)
+def _characters(raw: Int) -> Int:
+    """The bits as they are, if every character can be printed or is the filler 0."""
+    rest = raw
+    while rest:
+        character = rest & ((1 << CHARACTER_BITS) - 1)
+        if character and not 0x20 <= character <= 0x7E:
+            return INVALID
+        rest >>= CHARACTER_BITS
+    return raw

@@ -148,7 +148,11 @@ def test_a_bcd_digit_above_nine_is_invalid(first_bit: int) -> None:
 @pytest.mark.parametrize(
     ("hours", "minutes", "seconds", "expected"),
     [(0, 0, 0, (0.0, Status.NORMAL)), (12, 34, 56, (45296.0, Status.NORMAL)), (23, 59, 59, (86399.0, Status.NORMAL))]
-    + [(h, m, s, (0.0, Status.INVALID_DATA)) for h, m, s in [(24, 0, 0), (0, 60, 0), (0, 0, 60), (31, 63, 63)]],
+    + [(23, 59, 60, (86400.0, Status.NORMAL))]  # a leap second
+    + [
+        (h, m, s, (0.0, Status.INVALID_DATA))
+        for h, m, s in [(24, 0, 0), (0, 60, 0), (0, 0, 60), (22, 59, 60), (23, 59, 61), (31, 63, 63)]
+    ],
 )
 def test_utc_is_seconds_of_the_day_or_invalid(
     hours: int, minutes: int, seconds: int, expected: tuple[float, Status]

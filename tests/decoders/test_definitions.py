@@ -57,11 +57,11 @@ def test_a_file_of_the_users_is_a_set(tmp_path: Path) -> None:
 def test_a_row_that_contradicts_itself_is_refused(row: str, reason: str, tmp_path: Path) -> None:
     with pytest.raises(DefinitionError, match=reason) as caught:
         load_definitions(file_of(tmp_path, row))
-    assert str(caught.value).startswith("mine.toml [mine] label ")
+    assert f"{tmp_path / 'mine.toml'}:3 [mine] label " in str(caught.value)
 
 
 def test_a_label_twice_in_one_set_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DefinitionError, match=r"mine.toml \[mine\] label 014: defined twice"):
+    with pytest.raises(DefinitionError, match=r"mine.toml:3 \[mine\] label 014: defined twice"):
         load_definitions(file_of(tmp_path, f"label = '14', {ANGLE}", f"label = '014', {ANGLE}"))
 
 
