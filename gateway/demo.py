@@ -17,6 +17,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
+import numpy as np
 import rasterio
 from pyproj import Geod
 from rasterio.transform import Affine
@@ -85,7 +86,7 @@ def fly(out: Path, seed: int, speed: float) -> None:
     console = Console()
     out.mkdir(parents=True, exist_ok=True)
     true_terrain = BUILT_IN_TERRAIN["white_mountains"]
-    shifted = shift_east(true_terrain, SHIFT_EAST_M, out / "shifted_500m_east.tif")
+    shifted = shift_terrain(true_terrain, out / "shifted_500m_east.tif", east_m=SHIFT_EAST_M)
     failing = ({"name": "gnss_no_computed_data", "start_s": GNSS_FAILS_S},)
     legs = [
         Leg("true", "true terrain", true_terrain, "ok"),
@@ -108,15 +109,22 @@ def fly(out: Path, seed: int, speed: float) -> None:
     console.print("replayed: the events of all three recordings are identical to the live ones, byte for byte")
 
 
-def shift_east(terrain: Path, east_m: float, target: Path) -> Path:
-    """Write a copy of a terrain file whose content lies `east_m` metres farther east (measured at its middle)."""
+def shift_terrain(terrain: Path, target: Path, *, east_m: float = 0.0, north_m: float = 0.0, up_m: float = 0.0) -> Path:
+    """Write a copy of a terrain file whose content lies so many metres farther away, measured at its middle."""
     with rasterio.open(terrain) as source:
         t = source.transform
-        latitude = t.f + t.e * source.height / 2
-        east_deg = east_m / Geod(ellps="WGS84").inv(0, latitude, 1, latitude)[2]
-        profile = {**source.profile, "driver": "GTiff", "transform": Affine(t.a, 0, t.c + east_deg, 0, t.e, t.f)}
+        latitude, geod = t.f + t.e * source.height / 2, Geod(ellps="WGS84")
+        east_deg = east_m / geod.inv(0, latitude, 1, latitude)[2]
+        north_deg = north_m / geod.inv(0, latitude - 0.5, 0, latitude + 0.5)[2]
+        heights = source.read(masked=True).astype("float32") + np.float32(up_m)
+        profile = {
+            **source.profile,
+            "driver": "GTiff",
+            "dtype": "float32",
+            "transform": Affine(t.a, 0, t.c + east_deg, 0, t.e, t.f + north_deg),
+        }
         with rasterio.open(target, "w", **profile) as copy:
-            copy.write(source.read())
+            copy.write(heights.filled(source.nodata))
     return target
 
 
