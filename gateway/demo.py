@@ -31,8 +31,10 @@ from gateway.metadata import recorded_config, recorded_monitor
 from gateway.recording import Recording
 from gateway.replay import replay
 from gateway.report import Picture, write_report
-from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Verdict
+from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Monitor, Verdict
 from monitor.scans import Scan
+from monitor.terrain import open_terrain
+from monitor.warmup import warm_up
 
 SHIFT_EAST_M = 500.0
 SWEEP_S = 361 / 80  # 361 radials at 80 a second
@@ -96,6 +98,7 @@ def fly(out: Path, seed: int, speed: float) -> None:
     console.print(
         f"Three legs of {LEG_S:.0f} s over the White Mountains at {speed:g} times real bus rates, P_FA {P_FA:g}"
     )
+    warm_up(Monitor(open_terrain(true_terrain)))  # or the first gateway compiles before it hears anything
     for leg in legs:
         _live(leg, out, seed, speed, console)
         _again(leg)
@@ -148,7 +151,7 @@ def _live(leg: Leg, out: Path, seed: int, speed: float, console: Console) -> Non
                 gateway.kill()
                 raise GatewayError(f"leg {leg.title}: the gateway did not open its line within {START_S:.0f} s")
             play(_shown(traffic(scenario), bar, task), line, speed)
-            line.close()
+            line.drain()
             gateway.send_signal(signal.SIGTERM)
             code = gateway.wait(STOP_S)
             reader.join()
@@ -196,6 +199,7 @@ def _shown(packets: Iterator[tuple[int, bytes]], bar: Progress, task: TaskID) ->
     for time_ns, data in packets:
         bar.update(task, completed=time_ns / 1e9)
         yield time_ns, data
+    bar.update(task, completed=math.ceil(LEG_S))
 
 
 def _again(leg: Leg) -> None:
