@@ -26,11 +26,12 @@ from rich.console import Console
 from rich.progress import Progress, TaskID
 from rich.table import Table
 
+from gateway import events
 from gateway.errors import GatewayError
 from gateway.metadata import recorded_config, recorded_monitor
 from gateway.recording import Recording
 from gateway.replay import replay
-from gateway.report import Picture, write_report
+from gateway.report import Flown, Picture, write_report
 from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Monitor, Verdict
 from monitor.scans import Scan
 from monitor.terrain import open_terrain
@@ -59,7 +60,6 @@ class Leg:
     listening: Event = field(default_factory=Event)
     recording: Path = Path()
     identical: bool = False
-    pictures: list[Picture] = field(default_factory=list)
 
     @property
     def verdicts(self) -> list[dict[str, Any]]:
@@ -99,11 +99,12 @@ def fly(out: Path, seed: int, speed: float) -> None:
         f"Three legs of {LEG_S:.0f} s over the White Mountains at {speed:g} times real bus rates, P_FA {P_FA:g}"
     )
     warm_up(Monitor(open_terrain(true_terrain)))  # or the first gateway compiles before it hears anything
+    flown = []
     for leg in legs:
         _live(leg, out, seed, speed, console)
-        _again(leg)
+        flown.append(_again(leg))
     _table(legs, console)
-    report = write_report(out / "report", {leg.title: leg.pictures for leg in legs}, P_FA)
+    report = write_report(out / "report", flown)
     console.print(f"recordings in {out}, report in {report}")
     wrong = [f"{leg.title}: not {leg.expected} as it must be" for leg in legs if not leg.as_expected]
     wrong += [f"{leg.title}: replay differs from live" for leg in legs if not leg.identical]
@@ -202,19 +203,24 @@ def _shown(packets: Iterator[tuple[int, bytes]], bar: Progress, task: TaskID) ->
     bar.update(task, completed=math.ceil(LEG_S))
 
 
-def _again(leg: Leg) -> None:
-    """Replay the leg's recording, compare the events with the live ones, and keep what the pictures need."""
+def _again(leg: Leg) -> Flown:
+    """Replay the leg's recording, compare the events with the live ones, and keep what the report needs."""
     recording = Recording(leg.recording)
     config = recorded_config(recording.metadata)
     monitor = recorded_monitor(recording.metadata, config)
-    replayed: list[str] = []
+    if monitor is None:
+        raise GatewayError(f"{leg.recording} was made without terrain")
+    replayed: list[events.Event] = []
+    pictures: list[Picture] = []
     failures: list[str] = []
 
     def watch(scan: Scan, verdict: Verdict, comparison: Comparison | None) -> None:
-        leg.pictures.append(Picture(scan, verdict, comparison))
+        complete_ns = replayed[-1].time_ns  # the event before a verdict says that its scan is complete
+        pictures.append(Picture(complete_ns, scan, verdict, comparison))
 
-    replay(recording, config, monitor, lambda e: replayed.append(e.to_json() + "\n"), failures.append, watcher=watch)
-    leg.identical = replayed == leg.lines and not failures
+    replay(recording, config, monitor, replayed.append, failures.append, watcher=watch)
+    leg.identical = [event.to_json() + "\n" for event in replayed] == leg.lines and not failures
+    return Flown(leg.title, recording, monitor, replayed[0].time_ns, replayed[-1].time_ns, pictures)
 
 
 def _table(legs: list[Leg], console: Console) -> None:
