@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test lint bench integrity latency calibration setup lock clean
+.PHONY: demo test lint bench integrity sensitivity latency calibration setup lock clean
 
 demo: $(READY)
 	$(BIN)/shadebus demo
@@ -22,6 +22,10 @@ bench: $(READY)
 # Rates of false and true alerts on flights that nothing was tuned on; a few minutes on two cores.
 integrity: $(READY)
 	$(BIN)/python -m benchmarks.integrity
+
+# Which errors of terrain and heading alert, and how often; a few minutes on two cores.
+sensitivity: $(READY)
+	$(BIN)/python -m benchmarks.sensitivity
 
 # Time from a full scan on the line to its verdict, at real bus rates.
 latency: $(READY)

@@ -1,6 +1,6 @@
 """Simulated flights through the decoders and the monitor, byte for byte, as fast as they compute."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import islice
@@ -14,12 +14,13 @@ from gateway.metadata import build_monitor
 from gateway.pipeline import Pipeline
 from gateway.records import Raw, Stamp
 from monitor.calibration import Calibration
-from monitor.integrity import Comparison, Verdict
+from monitor.integrity import ALERT, Comparison, Verdict
 from monitor.scans import Scan
 from simulators.scenario import Scenario
 from simulators.traffic import traffic
 
 BATCH = 64
+ENOUGH_PAIRS = 20
 
 
 @dataclass(frozen=True)
@@ -70,3 +71,9 @@ def fly_all(flights: Iterable[Flight]) -> Iterator[list[Judged]]:
     with ProcessPoolExecutor() as pool:
         while batch := list(islice(flights, BATCH)):
             yield from pool.map(fly, batch)
+
+
+def detections(flown: Sequence[Sequence[Judged]]) -> tuple[int, int]:
+    """How many legs alert within two scans, and of how many: those with enough pairs in either scan."""
+    enough = [scans for scans in flown if max(scan.verdict.n_pairs for scan in scans[:2]) >= ENOUGH_PAIRS]
+    return sum(any(scan.verdict.verdict == ALERT for scan in scans[:2]) for scans in enough), len(enough)

@@ -1,9 +1,12 @@
 """The report: what the radar saw, what the terrain predicted, and how the two compare, as pictures and a page."""
 
 import html
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -11,52 +14,86 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from gateway.console import clock
+from gateway.recording import Recording
 from monitor.disparity import threshold
-from monitor.integrity import Comparison, Verdict
+from monitor.geodesy import NM_M
+from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Monitor, Verdict
 from monitor.scans import Scan
 
-LIT, SHADOW, UNSEEN = "#2f8f4e", "#101418", "#c9d1d9"
-VERDICT_COLOURS = {"ok": "#2f8f4e", "alert": "#c62828", "unavailable": "#b38600"}
-LEGEND = [Line2D([], [], ls="", marker="o", color=c, label=f"Q: {name}") for name, c in VERDICT_COLOURS.items()]
-LEGEND.append(Line2D([], [], ls="", marker="x", color="#8899aa", label="T as published"))
-LEVELS = ListedColormap(["#101418", "#2f8f4e", "#d7c32d", "#c62828", "#b63bb6"])
-STATES = ListedColormap([UNSEEN, SHADOW, LIT])
+VERDICT_COLOURS = {OK: "#2f8f4e", ALERT: "#c62828", UNAVAILABLE: "#b38600"}
+LEGEND = [
+    *(Line2D([], [], ls="", marker="o", color=VERDICT_COLOURS[name], label=f"Q: {name}") for name in (OK, ALERT)),
+    Line2D([], [], ls="", marker="x", color="#8899aa", label="T as published"),
+    Line2D([], [], lw=2, ls=":", color=VERDICT_COLOURS[UNAVAILABLE], label=UNAVAILABLE),
+    Line2D([], [], lw=1, ls="--", color="k", label="threshold"),
+]
+
+
+class Palette(NamedTuple):
+    """What each colour of a picture means, and the values at which one gives way to the next."""
+
+    names: dict[str, str]
+    bounds: tuple[float, ...]
+
+
+LEVELS = Palette(
+    {"none": "#101418", "1": "#2f8f4e", "2": "#d7c32d", "3": "#c62828", "4 and up": "#b63bb6"}, (0, 1, 2, 3, 4, 64)
+)
+STATES = Palette({"before the first lit bin": "#c9d1d9", "shadow": "#101418", "lit": "#2f8f4e"}, (-4, -1, 0.5, 3))
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One scan with its verdict and the two threads behind it."""
+    """One scan as it was complete at a UTC in ns, with its verdict and the two threads behind it."""
 
+    utc_ns: int
     scan: Scan
     verdict: Verdict
     comparison: Comparison | None
 
 
-def write_report(directory: Path, legs: Mapping[str, Sequence[Picture]], p_fa: float) -> Path:
-    """Write pictures and `index.html` into a directory; return the page's path. `p_fa` is that of the legs."""
+@dataclass(frozen=True)
+class Flown:
+    """One recording, the monitor that judged it, the UTC in ns of its first and last record, and its scans."""
+
+    title: str
+    recording: Recording
+    monitor: Monitor
+    began_ns: int
+    ended_ns: int
+    pictures: Sequence[Picture]
+
+
+def write_report(directory: Path, legs: Sequence[Flown]) -> Path:
+    """Write pictures and `index.html` into a directory; return the page's path."""
     directory.mkdir(parents=True, exist_ok=True)
     mpl.use("Agg")
+    every_scan = "; ".join(f"{leg.title}: {_extent(leg)}" for leg in legs)
     parts = ["<!doctype html><meta charset=utf-8><title>shadebus report</title>", STYLE, "<h1>shadebus report</h1>"]
-    _save(_timeline(legs, p_fa), directory / "statistic.png")
+    parts += [_origins(legs), EXPLANATION]
+    _save(_timeline(legs), directory / "statistic.png")
+    parts.append("<h2>The test statistic against its threshold</h2>")
+    how = "Each dot is a scan; above the dashed line it alerts. A vertical line is a scan without a verdict."
+    parts.append(_figure("statistic.png", "statistic over threshold", f"{how} {every_scan}."))
     _save(_histogram(legs), directory / "disparities.png")
-    parts.append("<h2>The test statistic against its threshold</h2><img src=statistic.png>")
+    parts.append("<h2>Disparities</h2>")
     parts.append(
-        "<p>Each dot is a scan; above the dashed line it alerts. A vertical line is a scan without a verdict.</p>"
-    )
-    parts.append("<h2>Disparities</h2><img src=disparities.png>")
-    for number, (title, pictures) in enumerate(legs.items()):
-        shown = next((p for p in reversed(pictures) if p.comparison is not None), None)
-        if shown is None or shown.comparison is None:
-            continue
-        name = f"scan_{number}.png"
-        _save(_ppi(shown.scan, shown.comparison), directory / name)
-        caption = f"{title}: scan {shown.verdict.scan}, {shown.verdict.verdict}"
-        parts.append(f"<h2>{html.escape(caption)}</h2><img src={name}>")
-        parts.append(
-            "<p>Left: what the radar sent. Then lit bins green, shadows black, and grey before the first lit bin.</p>"
+        _figure(
+            "disparities.png",
+            "disparities",
+            f"The disparities of all pairs of a leg, in steps of 3 bins, all beyond in the outermost. {every_scan}.",
         )
+    )
+    parts.append("<h2>The last scan of each leg</h2>")
+    for number, leg in enumerate(legs):
+        for picture in leg.pictures[-1:]:
+            name = f"scan_{number}.png"
+            _save(_ppi(leg.title, picture), directory / name)
+            parts.append(_figure(name, _heading(leg.title, picture), _caption(leg.title, picture)))
     parts.append(_table(legs))
     page = directory / "index.html"
     page.write_text("\n".join(parts), encoding="utf-8")
@@ -65,23 +102,103 @@ def write_report(directory: Path, legs: Mapping[str, Sequence[Picture]], p_fa: f
 
 STYLE = (
     "<style>body{font:15px sans-serif;max-width:1100px;margin:2em auto;padding:0 1em}img{max-width:100%}"
-    "table{border-collapse:collapse}td,th{border:1px solid #ccc;padding:.2em .6em;text-align:right}</style>"
+    "table{border-collapse:collapse}td,th{border:1px solid #ccc;padding:.2em .6em;text-align:right}"
+    "td.text,#origins td,#origins th{text-align:left;overflow-wrap:anywhere}figure{margin:1em 0 2em}"
+    "figcaption{color:#444}</style>"
 )
+
+EXPLANATION = """<h2>What the figures mean</h2>
+<p>A shadow is a run of dark range bins behind high ground. On each radial used, a shadow that the radar sees is
+paired with the one that the stored terrain predicts there; N<sub>D</sub> is the number of pairs in the scan. The
+disparity D of a pair is the difference of the two centres, radar minus terrain, in range bins. T is the mean of
+D<sup>2</sup>, as published. Q is the sum of the squares of D, each taken about its calibrated median and clipped,
+over the calibrated variance; it has no unit. The threshold is what the statistic of the method (Q for robust,
+N<sub>D</sub> T / sigma<sup>2</sup> for paper) exceeds with probability P<sub>FA</sub> in a scan in which nothing is
+wrong: above it the verdict is <i>alert</i>. The mean is that of D: a terrain that lies too near or too far on all
+radials moves it, a sideways shift need not. Unmatched is the share of shadows that have no partner in the other
+thread: of the radar's, and of the terrain's. It is reported and not judged. <i>Unavailable</i> means that nothing
+can be said, for the reason given; it is neither ok nor alert.</p>"""
+
+
+def _utc(time_ns: int) -> str:
+    return f"{datetime.fromtimestamp(time_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+def _extent(leg: Flown) -> str:
+    if not leg.pictures:
+        return "no scan"
+    first, last = leg.pictures[0], leg.pictures[-1]
+    counts = Counter(picture.verdict.verdict for picture in leg.pictures)
+    verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+    return f"scans {first.verdict.scan} to {last.verdict.scan}, {_utc(first.utc_ns)} to {_utc(last.utc_ns)}, {verdicts}"
+
+
+def _caption(title: str, picture: Picture) -> str:
+    scan, verdict, shape = picture.scan, picture.verdict, picture.scan.bins.shape
+    bin_m = scan.range_nm * NM_M / shape[1]
+    said = "; ".join((verdict.verdict, *verdict.reasons))
+    return (
+        f"{title}: scan {verdict.scan}, {_utc(picture.utc_ns)}, verdict {said}. {shape[0]} radials of {shape[1]} "
+        f"range bins of {bin_m:.1f} m."
+    )
+
+
+def _heading(title: str, picture: Picture) -> str:
+    """Two lines: which scan, and its verdict."""
+    v = picture.verdict
+    why = f": {v.reasons[0]}" if v.verdict == UNAVAILABLE else ""
+    return f"{title}, scan {v.scan}, {_utc(picture.utc_ns)}\n{v.verdict}{why}"
+
+
+def _figure(name: str, heading: str, caption: str) -> str:
+    """A picture with what stands in it for those who cannot see it, and its caption."""
+    image = f'<img src="{name}" alt="{html.escape(heading)}">'
+    return f"<figure>{image}<figcaption>{html.escape(caption)}</figcaption></figure>"
+
+
+def _origins(legs: Sequence[Flown]) -> str:
+    """Where the figures come from, a row for each fact; what is the same for all legs is said once."""
+    rows = ["<table id=origins><tr><th>leg" + "".join(f"<th>{html.escape(leg.title)}" for leg in legs)]
+    for name, say in ORIGINS.items():
+        said = [html.escape(say(leg)) for leg in legs]
+        cells = f"<td colspan={len(said)}>{said[0]}" if len(set(said)) == 1 else "".join(f"<td>{text}" for text in said)
+        rows.append(f"<tr><th>{name}{cells}")
+    return "\n".join([*rows, "</table>"])
+
+
+VERSIONS = ("shadebus", "numpy", "python")
+ORIGINS: dict[str, Callable[[Flown], str]] = {
+    "recording": lambda leg: leg.recording.path.name,
+    "began": lambda leg: _utc(leg.began_ns),
+    "ended": lambda leg: _utc(leg.ended_ns),
+    "terrain": lambda leg: ", ".join(path.name for path in leg.monitor.terrain.paths),
+    "terrain checksum (CRC-32)": lambda leg: leg.monitor.terrain.checksum,
+    "method": lambda leg: leg.monitor.settings.method,
+    "P<sub>FA</sub> (per scan)": lambda leg: f"{leg.monitor.settings.p_fa:g}",
+    "calibration": lambda leg: leg.monitor.calibration.name,
+    "made from": lambda leg: leg.monitor.calibration.provenance,
+    "versions": lambda leg: ", ".join(f"{name} {leg.recording.metadata[name]}" for name in VERSIONS),
+}
 
 
 def _save(figure: Figure, path: Path) -> None:
     figure.savefig(path, dpi=110, bbox_inches="tight")
 
 
-def _ppi(scan: Scan, comparison: Comparison) -> Figure:
-    figure = Figure(figsize=(13, 3.4))
-    panels = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
-    width_nm = scan.range_nm / scan.bins.shape[1]
-    _polar(panels[0], scan.scan_angle_deg, scan.bins, width_nm, LEVELS, (0, 1, 2, 3, 4, 64))
-    _polar(panels[1], comparison.scan_angle_deg, comparison.radar_states, width_nm, STATES, (-4, -1, 0.5, 3))
-    _polar(panels[2], comparison.scan_angle_deg, comparison.dem_states, width_nm, STATES, (-4, -1, 0.5, 3))
-    for axes, title in zip(panels, ("radar levels", "radar: lit and shadow", "terrain: lit and shadow"), strict=True):
-        axes.set_title(f"{title} ({scan.range_nm:g} NM)")
+def _ppi(title: str, picture: Picture) -> Figure:
+    """Radar levels, and beside them both threads if there was a comparison."""
+    scan, compared = picture.scan, picture.comparison
+    shown: list[tuple[str, NDArray[np.float64], NDArray[np.uint8] | NDArray[np.int8], Palette]]
+    shown = [("radar levels", scan.scan_angle_deg, scan.bins, LEVELS)]
+    if compared:
+        shown.append(("radar: lit and shadow", compared.scan_angle_deg, compared.radar_states, STATES))
+        shown.append(("terrain: lit and shadow", compared.scan_angle_deg, compared.dem_states, STATES))
+    figure = Figure(figsize=(5.2 * len(shown), 4))
+    panels = figure.subplots(1, len(shown), subplot_kw={"projection": "polar"}, squeeze=False)[0]
+    for panel, (name, angle_deg, values, palette) in zip(panels, shown, strict=True):
+        _polar(panel, angle_deg, values, scan.range_nm / scan.bins.shape[1], palette)
+        panel.set_title(f"{name} (range in NM)", y=0.9)
+    figure.suptitle(_heading(title, picture))
     return figure
 
 
@@ -90,63 +207,83 @@ def _polar(
     angle_deg: NDArray[np.float64],
     values: NDArray[np.uint8] | NDArray[np.int8],
     width_nm: float,
-    colours: ListedColormap,
-    bounds: Sequence[float],
+    palette: Palette,
 ) -> None:
     order = np.argsort(angle_deg)
     angle = np.radians(angle_deg[order])
     edges = np.r_[1.5 * angle[0] - 0.5 * angle[1], (angle[1:] + angle[:-1]) / 2, 1.5 * angle[-1] - 0.5 * angle[-2]]
     ranges = np.arange(values.shape[1] + 1) * width_nm
-    norm = BoundaryNorm(bounds, colours.N)
-    axes.pcolormesh(edges, ranges, values[order].T, cmap=colours, norm=norm, rasterized=True)
+    cmap, norm = ListedColormap(list(palette.names.values())), BoundaryNorm(palette.bounds, len(palette.names))
+    axes.pcolormesh(edges, ranges, values[order].T, cmap=cmap, norm=norm, rasterized=True)
     axes.set(theta_zero_location="N", theta_direction=-1, thetamin=-90, thetamax=90)
     axes.grid(visible=False)
+    named = [Patch(color=colour, label=name) for name, colour in palette.names.items()]
+    axes.legend(handles=named, loc="upper center", bbox_to_anchor=(0.5, 0.13), ncols=len(named), fontsize="small")
 
 
-def _timeline(legs: Mapping[str, Sequence[Picture]], p_fa: float) -> Figure:
+def _timeline(legs: Sequence[Flown]) -> Figure:
     figure = Figure(figsize=(11, 4.5))
     axes = figure.subplots(1, len(legs), sharey=True, squeeze=False)[0]
-    for panel, (title, pictures) in zip(axes, legs.items(), strict=True):
-        first_ns = pictures[0].scan.time_ns[0] if pictures else 0
-        for picture in pictures:
+    for panel, leg in zip(axes, legs, strict=True):
+        first_ns = leg.pictures[0].scan.time_ns[0] if leg.pictures else 0
+        for picture in leg.pictures:
             time_s = (picture.scan.time_ns[-1] - first_ns) / 1e9
             v = picture.verdict
             colour = VERDICT_COLOURS[v.verdict]
             if v.q is None or v.threshold is None:
-                panel.axvline(time_s, color=colour, alpha=0.3)
+                panel.axvline(time_s, color=colour, lw=2, ls=":")
             else:
                 panel.plot(time_s, v.q / v.threshold, "o", color=colour)
-                panel.plot(time_s, (v.t_normalised or 0) / threshold(v.n_pairs, p_fa), "x", color="#8899aa")
+                t_threshold = threshold(v.n_pairs, leg.monitor.settings.p_fa)
+                panel.plot(time_s, (v.t_normalised or 0) / t_threshold, "x", color="#8899aa")
         panel.axhline(1, color="k", lw=1, ls="--")
-        panel.set(title=title, xlabel="time (s)")
+        panel.set(title=leg.title, xlabel="time since the first radial (s)")
     axes[0].set(ylabel="statistic over its threshold", ylim=(0, 1.1 * max(axes[0].get_ylim()[1], 1)))
-    axes[0].legend(handles=LEGEND, loc="upper left", fontsize="small")
+    figure.legend(handles=LEGEND, ncols=len(LEGEND), loc="outside upper center", fontsize="small")
     return figure
 
 
-def _histogram(legs: Mapping[str, Sequence[Picture]]) -> Figure:
+def _histogram(legs: Sequence[Flown]) -> Figure:
     figure = Figure(figsize=(11, 3.8))
     axes = figure.subplots()
-    edges = np.arange(-60.5, 61.5, 3)
-    for title, pictures in legs.items():
-        found = [p.comparison.disparities for p in pictures if p.comparison is not None]
+    edges = np.arange(-61.5, 62, 3)
+    for leg in legs:
+        found = [p.comparison.disparities for p in leg.pictures if p.comparison is not None]
         d = np.concatenate(found) if found else np.empty(0)
-        axes.hist(
-            np.clip(d, edges[0], edges[-1]), edges.tolist(), histtype="step", lw=1.6, label=f"{title} ({d.size} pairs)"
-        )
+        inside = np.clip(d, edges[0], edges[-1])
+        axes.hist(inside, edges.tolist(), histtype="step", lw=1.6, label=f"{leg.title} ({d.size} pairs)")
     axes.set(xlabel="disparity, radar minus terrain (range bins)", ylabel="pairs")
     axes.legend()
     return figure
 
 
-def _table(legs: Mapping[str, Sequence[Picture]]) -> str:
-    headings = ("leg", "scan", "verdict", "N", "T (bins<sup>2</sup>)", "Q", "threshold", "mean", "reasons")
-    rows = ["<h2>Verdicts</h2><table><tr>" + "".join(f"<th>{heading}" for heading in headings)]
-    for title, pictures in legs.items():
-        for v in (picture.verdict for picture in pictures):
+HEADINGS = (
+    "leg",
+    "scan",
+    "time (UTC)",
+    "verdict",
+    "N<sub>D</sub> (pairs)",
+    "T (bins<sup>2</sup>)",
+    "Q (no unit)",
+    "threshold (no unit)",
+    "mean (bins)",
+    "unmatched, radar (%)",
+    "unmatched, terrain (%)",
+    "reasons",
+)
+
+
+def _table(legs: Sequence[Flown]) -> str:
+    rows = ["<h2>Verdicts</h2><table><tr>" + "".join(f"<th>{heading}" for heading in HEADINGS)]
+    for leg in legs:
+        for picture in leg.pictures:
+            v = picture.verdict
+            shares = (None if share is None else 100 * share for share in (v.unmatched_radar, v.unmatched_dem))
             figures = "".join(
-                f"<td>{'' if x is None else format(x, '.1f')}" for x in (v.t_bins2, v.q, v.threshold, v.mean_bins)
+                f"<td>{'' if x is None else format(x, '.1f')}"
+                for x in (v.t_bins2, v.q, v.threshold, v.mean_bins, *shares)
             )
+            texts = (html.escape(leg.title), v.scan, clock(picture.utc_ns), v.verdict, v.n_pairs)
             reasons = html.escape("; ".join(v.reasons))
-            rows.append(f"<tr><td>{html.escape(title)}<td>{v.scan}<td>{v.verdict}<td>{v.n_pairs}{figures}<td>{reasons}")
+            rows.append("<tr>" + "".join(f"<td>{text}" for text in texts) + f"{figures}<td class=text>{reasons}")
     return "\n".join([*rows, "</table>"])

@@ -19,11 +19,12 @@ METRES_PER_DEGREE = 111_200.0  # good enough to scale errors
 
 
 def inertial_measurement(settings: scenario.Scenario, trajectory: Trajectory) -> Measure:
-    """Motion at times (n,) with a bias on each angle and on the altitude, and a position that drifts off steadily."""
+    """Motion at times (n,) with a bias on each angle and on the altitude, a drifting position, and the faults."""
     rng = np.random.default_rng((settings.seed, INERTIAL_STREAM))
     pitch, roll, heading, track = rng.normal(0.0, settings.errors.inertial_angle_deg, 4)
     north, east = rng.normal(0.0, settings.errors.inertial_drift_mps, 2)
     height = rng.normal(0.0, settings.errors.inertial_altitude_m)
+    turns = [fault for fault in settings.faults if fault.name == "heading_offset"]
 
     def measure(time_s: Floats) -> Truth:
         truth = trajectory.at(time_s)
@@ -31,7 +32,7 @@ def inertial_measurement(settings: scenario.Scenario, trajectory: Trajectory) ->
             _moved(truth, north * time_s, east * time_s, height),
             pitch_deg=truth.pitch_deg + pitch,
             roll_deg=truth.roll_deg + roll,
-            heading_deg=truth.heading_deg + heading,
+            heading_deg=truth.heading_deg + heading + sum(turn.heading_deg * during(turn, time_s) for turn in turns),
             track_deg=truth.track_deg + track,
         )
 

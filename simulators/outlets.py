@@ -80,12 +80,15 @@ class PtyOutlet(_Closing):
             return
         self._closing.set()
         with self._lock:
-            self._drain()
+            self.drain()
             os.close(self._slave)
             os.close(self._master)
 
-    def _drain(self) -> None:
-        """Two empty looks in a row, as bytes move into the reader's queue a moment after they are written."""
+    def drain(self) -> None:
+        """Wait up to a second for the reader to empty the terminal.
+
+        Two empty looks in a row, as bytes move into the reader's queue a moment after they are written.
+        """
         deadline, empty = time.monotonic() + DRAIN_S, 0
         while empty < 2 and time.monotonic() < deadline:
             (waiting,) = struct.unpack("i", fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)))

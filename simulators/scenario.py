@@ -98,11 +98,12 @@ class Errors(Settings):
 
 
 class Fault(Settings):
-    """A named fault over a window of flight time; the offsets belong to `gnss_offset`."""
+    """A named fault over a window of flight time; metres belong to `gnss_offset`, degrees to `heading_offset`."""
 
     name: Literal[
         "gnss_no_computed_data",
         "gnss_offset",
+        "heading_offset",
         "inertial_failure_warning",
         "radio_altitude_no_computed_data",
         "radar_silent",
@@ -113,6 +114,7 @@ class Fault(Settings):
     north_m: float = 0.0
     east_m: float = 0.0
     up_m: float = 0.0
+    heading_deg: float = 0.0
 
     @model_validator(mode="after")
     def _window_runs_forward(self) -> Self:

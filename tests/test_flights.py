@@ -3,12 +3,16 @@
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 import pytest
+import rasterio
 
 from benchmarks.flights import Flight, Judged, fly
-from gateway.demo import CALIBRATION, SHIFT_EAST_M, shift_east
+from benchmarks.sensitivity import ERRORS, SENSITIVITY
+from gateway.demo import CALIBRATION, SHIFT_EAST_M, shift_terrain
 from monitor.calibration import load_calibration
 from monitor.integrity import ALERT, OK, UNAVAILABLE
+from monitor.terrain import open_terrain
 from simulators.scenario import BUILT_IN_TERRAIN, Fault, Radar, Scenario, World, white_mountains
 from simulators.scenario import Flight as Plan
 
@@ -28,9 +32,44 @@ def verdicts(judged: list[Judged]) -> set[str]:
     return {scan.verdict.verdict for scan in judged}
 
 
+def test_shifted_terrain_has_its_heights_where_they_were_moved_to(tmp_path: Path) -> None:
+    true, moved = (
+        open_terrain(path)
+        for path in (
+            WHITE_MOUNTAINS,
+            shift_terrain(WHITE_MOUNTAINS, tmp_path / "moved.tif", east_m=500.0, north_m=-200.0, up_m=-30.5),
+        )
+    )
+    latitude, longitude = np.array([44.4, 44.5, 44.6]), np.array([-71.6, -71.5, -71.4])
+    east_deg = 500 / (111_320 * np.cos(np.radians(44.5)))  # one length for the whole cell, that of its middle
+    found = moved.elevation(latitude - 200 / 111_132, longitude + east_deg)
+    assert found == pytest.approx(true.elevation(latitude, longitude) - 30.5, abs=2.0)
+
+
+def test_voids_of_shifted_terrain_stay_voids(tmp_path: Path) -> None:
+    holed = tmp_path / "holed.tif"
+    with rasterio.open(WHITE_MOUNTAINS) as source:
+        heights = source.read()
+        heights[0, 600:610, 600:610] = source.nodata
+        with rasterio.open(holed, "w", **{**source.profile, "driver": "GTiff"}) as copy:
+            copy.write(heights)
+    raised = shift_terrain(holed, tmp_path / "raised.tif", up_m=50.0)
+    assert np.isnan(open_terrain(raised).grid.height_m).sum() == 100
+
+
+def test_the_page_of_sensitivities_has_a_line_for_each_error_that_is_flown() -> None:
+    lines = SENSITIVITY.read_text().splitlines()
+    assert [name for name in ERRORS if not any(line.startswith(f"{name}  ") for line in lines)] == []
+
+
+def test_a_heading_four_degrees_off_alerts() -> None:
+    faults = (Fault(name="heading_offset", heading_deg=4.0),)
+    assert ALERT in verdicts(fly(Flight(low_pass(faults=faults), WHITE_MOUNTAINS, P_FA)))
+
+
 @pytest.fixture(scope="module")
 def shifted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return shift_east(WHITE_MOUNTAINS, SHIFT_EAST_M, tmp_path_factory.mktemp("terrain") / "shifted.tif")
+    return shift_terrain(WHITE_MOUNTAINS, tmp_path_factory.mktemp("terrain") / "shifted.tif", east_m=SHIFT_EAST_M)
 
 
 @pytest.mark.parametrize(

@@ -124,6 +124,14 @@ def test_a_position_offset_moves_the_gnss_by_its_metres_and_leaves_the_status_no
     assert {ssm_of(word) for word in shifted[2].words(0o110, SECONDS).tolist()} == {3}
 
 
+def test_a_heading_offset_turns_the_inertial_heading_by_its_degrees_and_nothing_else() -> None:
+    fault = scenario.Fault(name="heading_offset", start_s=5, heading_deg=2)
+    (_, healthy), (_, turned) = fly(), fly(faults=(fault,))
+    heading = values(turned[1], 0o314, 14, 180 / 2**15) - values(healthy[1], 0o314, 14, 180 / 2**15)
+    assert heading == pytest.approx([0] * 5 + [2] * 5, abs=0.01)
+    assert turned[1].words(0o324, SECONDS).tolist() == healthy[1].words(0o324, SECONDS).tolist()
+
+
 def test_below_seven_knots_the_track_is_not_computed() -> None:
     slow = scenario.white_mountains(10.0).flight.model_copy(update={"ground_speed_mps": 3.0})
     _, buses = fly(flight=slow)

@@ -51,6 +51,19 @@ def test_closing_a_pseudo_terminal_waits_for_its_reader() -> None:
     assert received == DATA[:4000]
 
 
+def test_draining_a_pseudo_terminal_waits_for_its_reader_and_leaves_it_open() -> None:
+    received = bytearray()
+    with PtyOutlet() as outlet:
+        reader = os.open(outlet.path, os.O_RDONLY | os.O_NOCTTY)
+        for _ in range(2):
+            outlet.write(DATA[:4000])
+            threading.Timer(0.2, lambda: received.extend(os.read(reader, 4000))).start()
+            outlet.drain()
+            time.sleep(0.05)  # the terminal is empty a moment before the reader has put its bytes away
+        os.close(reader)
+    assert received == 2 * DATA[:4000]
+
+
 def test_a_writer_that_waits_for_nobody_is_released_by_close(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("simulators.outlets.DRAIN_S", 0.1)
     outlet = PtyOutlet()
