@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from gateway.console import clock
 from gateway.recording import Recording
+from monitor.calibration import Calibration
 from monitor.disparity import threshold
 from monitor.geodesy import NM_M
 from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Monitor, Verdict
@@ -175,10 +176,13 @@ ORIGINS: dict[str, Callable[[Flown], str]] = {
     "terrain checksum (CRC-32)": lambda leg: leg.monitor.terrain.checksum,
     "method": lambda leg: leg.monitor.settings.method,
     "P<sub>FA</sub> (per scan)": lambda leg: f"{leg.monitor.settings.p_fa:g}",
-    "calibration": lambda leg: leg.monitor.calibration.name,
-    "made from": lambda leg: leg.monitor.calibration.provenance,
+    "calibration": lambda leg: _calibration(leg.monitor.calibration),
     "versions": lambda leg: ", ".join(f"{name} {leg.recording.metadata[name]}" for name in VERSIONS),
 }
+
+
+def _calibration(calibration: Calibration | None) -> str:
+    return f"{calibration.name}: {calibration.provenance}" if calibration else "none, so stated defaults"
 
 
 def _save(figure: Figure, path: Path) -> None:

@@ -70,7 +70,7 @@ def test_the_page_says_when_from_what_and_how_it_was_made(shown: Shown) -> None:
         assert f"{datetime.fromtimestamp(first / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC" in shown.page
         assert {path.name, metadata["terrain_checksum"]} <= set(re.findall(r"[\w.]+", shown.page))
         assert all(f"{name} {metadata[name]}" in shown.page for name in VERSIONS)
-    for text in (calibration.name, calibration.provenance, "robust", f"{demo.P_FA:g}", "N44W072.hgt"):
+    for text in (f"{calibration.name}: {calibration.provenance}", "robust", f"{demo.P_FA:g}", "N44W072.hgt"):
         assert f">{text}" in shown.page
 
 
