@@ -1,5 +1,6 @@
 """Replay: the records of a file through the same core as live."""
 
+import threading
 import time
 from collections.abc import Callable
 
@@ -22,11 +23,12 @@ def replay(
     speed: float | None = None,
     start_s: float = 0.0,
     stop_s: float | None = None,
+    stop: threading.Event | None = None,
 ) -> int:
     """Emit the events of a recording, as fast as possible or at `speed` times real time; return the core's failures.
 
     `start_s` and `stop_s` count from the first record. What lies before `start_s` is fed all the same, since what comes
-    later depends on it, but its events are not emitted.
+    later depends on it, but its events are not emitted. `stop` ends the replay between two records, without a summary.
     """
     begun = False
 
@@ -35,6 +37,7 @@ def replay(
             emit(event)
 
     core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit_once_begun, report)
+    halt = stop or threading.Event()
     began_ns = time.monotonic_ns()
     first_ns: int | None = None
     for record in recording:
@@ -45,7 +48,9 @@ def replay(
         if not begun and elapsed_s >= start_s:
             begun, began_ns = True, time.monotonic_ns()
         if begun and speed:
-            time.sleep(max(0.0, (elapsed_s - start_s) / speed - (time.monotonic_ns() - began_ns) / 1e9))
+            halt.wait(max(0.0, (elapsed_s - start_s) / speed - (time.monotonic_ns() - began_ns) / 1e9))
+        if halt.is_set():
+            return core.failures
         core.process(record)
     core.finish()
     return core.failures

@@ -1,0 +1,72 @@
+"""Ctrl-C and SIGTERM end every verb soon, with the exit code that a shell expects and without a traceback."""
+
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from gateway.config import check_config
+from gateway.metadata import describe
+from gateway.recording import Recorder
+from gateway.records import Raw, Record
+from tests.gateway.made import stamp, tick
+from tests.gateway.shell import GATEWAY
+
+SOON_S = 2.0
+
+
+@pytest.fixture(scope="module")
+def long_recording(stream: bytes, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Minutes of traffic and hours of waiting: no verb comes to its end by itself while a test looks."""
+    config = check_config({"adapters": [{"name": "bridge", "source": "serial:x"}]}, "test")
+    recorder = Recorder(tmp_path_factory.mktemp("long") / "a.mcap", describe(config, None))
+    records: list[Record] = [tick(0, 0.0), tick(1, 1.0)]
+    records += [Raw(2 + k, stamp(10_000.0 + k), "bridge", stream, 0) for k in range(300)]
+    recorder.append(records)
+    recorder.close()
+    return recorder.path
+
+
+def at_work(*arguments: str | Path) -> "subprocess.Popen[bytes]":
+    """A verb whose kernels are loaded and whose handlers stand, as its open recording shows."""
+    process = subprocess.Popen([*GATEWAY, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    files = Path(f"/proc/{process.pid}/fd")
+    deadline = time.monotonic() + 30
+    while not any(file.readlink().suffix == ".mcap" for file in files.iterdir() if file.is_symlink()):
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.005)
+    return process
+
+
+@pytest.mark.parametrize(
+    ("verb", "number", "code"),
+    [
+        (("replay",), signal.SIGINT, 130),
+        (("replay", "--json", "--speed", "1"), signal.SIGTERM, 143),
+        (("info",), signal.SIGTERM, 143),
+        (("dump",), signal.SIGINT, 130),
+    ],
+)
+def test_a_verb_ends_soon(verb: tuple[str, ...], number: signal.Signals, code: int, long_recording: Path) -> None:
+    with at_work(*verb, long_recording) as process:
+        assert process.stdout is not None and process.stderr is not None
+        eater = threading.Thread(target=process.stdout.read)
+        eater.start()
+        time.sleep(0.1)
+        began = time.monotonic()
+        process.send_signal(number)
+        errors = process.stderr.read()
+        assert process.wait(20) == code
+        assert time.monotonic() - began < SOON_S
+        eater.join()
+    assert errors == b""
+
+
+def test_a_reader_that_stands_still_does_not_hold_a_verb(long_recording: Path) -> None:
+    with at_work("dump", long_recording) as process:
+        time.sleep(0.5)  # the pipe is full, and nobody reads it
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20) == 143
