@@ -1,9 +1,11 @@
 """Ctrl-C and SIGTERM end every verb soon, with the exit code that a shell expects and without a traceback."""
 
+import os
 import signal
 import subprocess
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from gateway.config import check_config
 from gateway.metadata import describe
 from gateway.recording import Recorder
 from gateway.records import Raw, Record
+from tests.gateway.live import wait_until
 from tests.gateway.made import stamp, tick
 from tests.gateway.shell import GATEWAY
 
@@ -70,3 +73,30 @@ def test_a_reader_that_stands_still_does_not_hold_a_verb(long_recording: Path) -
         time.sleep(0.5)  # the pipe is full, and nobody reads it
         process.send_signal(signal.SIGTERM)
         assert process.wait(20) == 143
+
+
+@pytest.mark.parametrize(("number", "kill", "code"), [(signal.SIGINT, os.killpg, 130), (signal.SIGTERM, os.kill, 143)])
+def test_a_demo_that_is_stopped_leaves_no_gateway_behind(
+    number: signal.Signals, kill: Callable[[int, int], None], code: int, tmp_path: Path
+) -> None:
+    """Ctrl-C goes to all processes of the terminal's group, SIGTERM to one."""
+    command = [*GATEWAY, "demo", "--out", str(tmp_path)]
+    with subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as demo:
+        assert demo.stderr is not None
+        wait_until(lambda: [*tmp_path.glob("true/*.mcap")], "a recording")
+        assert gateways(tmp_path)
+        began = time.monotonic()
+        kill(demo.pid, number)
+        errors = demo.stderr.read()
+        assert demo.wait(20) == code
+        assert time.monotonic() - began < 2 * SOON_S
+    assert gateways(tmp_path) == []
+    assert [text for text in errors.splitlines() if not text.startswith("recording to ")] == []
+
+
+def gateways(directory: Path) -> list[str]:
+    """The command lines of the gateways that run with a rack file in a directory."""
+    listed = subprocess.run(["ps", "-ewwo", "args"], capture_output=True, text=True, timeout=20, check=True).stdout
+    return [line for line in listed.splitlines() if f"gateway run -c {directory}/" in line]
