@@ -29,6 +29,7 @@ def replay(
 
     `start_s` and `stop_s` count from the first record. What lies before `start_s` is fed all the same, since what comes
     later depends on it, but its events are not emitted. `stop` ends the replay between two records, without a summary.
+    Raises what `emit` raised.
     """
     begun = False
 
@@ -52,5 +53,9 @@ def replay(
         if halt.is_set():
             return core.failures
         core.process(record)
+        if core.unheard:
+            raise core.unheard
     core.finish()
+    if core.unheard:
+        raise core.unheard
     return core.failures

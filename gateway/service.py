@@ -39,7 +39,7 @@ class Service:
         sync_s = config.recording.sync_interval_s if config.recording else 1.0
         self._to_core = CoreQueue(lambda reason: self._journal.report("core", "BEHIND", reason))
         self._journal = Journal(recorder, self._to_core.deliver, limit_bytes, sync_s)
-        core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, self._core_failed)
+        self._core = core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, self._core_failed)
 
         def core_work() -> None:
             if monitor:
@@ -64,6 +64,11 @@ class Service:
             if errors:
                 self.stop()
                 raise GatewayError("; ".join(errors))
+
+    @property
+    def deserted(self) -> Exception | None:
+        """Why the service has nobody left to work for: its events are not heard, and it does not record."""
+        return None if self.recording_path else self._core.unheard
 
     @property
     def stuck(self) -> bool:
@@ -113,6 +118,8 @@ class Service:
         if len(self.failures) < MOST_FAILURES:  # the recording has them all
             self.failures.append(f"core: {reason}")
         self._journal.report("core", "FAILED", reason)
+        if self.deserted:
+            self.broken.set()
 
     def _died(self, name: str, error: BaseException) -> None:
         reason = f"{type(error).__name__}: {error}"

@@ -59,5 +59,7 @@ def run(
     if service.stuck:  # it holds stdout, so an orderly exit would wait for it too
         print(f"shadebus: {'; '.join(service.failures)}", file=sys.stderr, flush=True)
         os._exit(1)
+    if service.deserted:
+        raise service.deserted
     if service.failures:
         raise GatewayError("; ".join(service.failures))

@@ -1,5 +1,7 @@
 """A mistake at the command line is one line on stderr that names the thing and the mend, and a non-zero exit."""
 
+import grp
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -9,11 +11,12 @@ import pytest
 from mcap.writer import Writer
 
 from gateway.config import check_config
+from gateway.doctor import permission_mend
 from gateway.metadata import build_monitor, describe
 from gateway.recording import Recorder
 from simulators.outlets import PtyOutlet
 from tests.gateway.conftest import TERRAIN
-from tests.gateway.shell import shadebus
+from tests.gateway.shell import GATEWAY, shadebus
 
 Arguments = list[str | Path]
 # Nothing is forbidden to root, so the command gives its rights up, once it has loaded what only root may read.
@@ -96,6 +99,13 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
     "bad length": (lambda d: ["decode", "708", "b443"], ("2 bytes given, 8 or 200 needed",)),
     "unknown set": (lambda d: ["decode", "429", "1", "--set", "gps"], ("no definitions 'gps'", "gnss_743a")),
     "half a configuration": (lambda d: ["thresholds", "--n", "60"], ("give all of --n",)),
+    "no port": (lambda d: ["simulate", "--to", "tcp:x"], ("--to tcp:x: 'x' is no port", "use 1 to 65535")),
+    "port too high": (lambda d: ["simulate", "--to", "tcp:99999"], ("'99999' is no port", "use 1 to 65535")),
+    "full file": (
+        lambda d: ["simulate", "--to", "file:/dev/full", "--duration", "1"],
+        ("--to file:/dev/full: No space left on device: choose another",),
+    ),
+    "demo without a place": (lambda d: ["demo", "--out", "/proc/no"], ("cannot write to /proc/no", "with --out")),
     "unknown outlet": (lambda d: ["simulate", "--to", "tin"], ("--to tin: use pty, tcp:PORT or file:PATH",)),
 }
 
@@ -119,6 +129,54 @@ def test_a_line_without_permission_is_named_with_the_group_to_join() -> None:
     assert done.returncode == 1
     assert f"{line.path}: no permission: add yourself to the dialout group" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_terrain_without_permission_is_named(tmp_path: Path) -> None:
+    (tmp_path / "closed").mkdir(mode=0)
+    dem = tmp_path / "closed" / "a.hgt"
+    done = subprocess.run(
+        [*AS_NOBODY, *map(str, source("--dem", dem))], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr == f"shadebus: terrain file {dem} may not be read: give this user the right to read it\n"
+
+
+@pytest.mark.parametrize("arguments", ["--help", "thresholds", "decode 708 b443047a0e80767c", "simulate"])
+def test_a_full_standard_output_is_named(arguments: str) -> None:
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            [*GATEWAY, *arguments.split()], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr == "shadebus: standard output: No space left on device; choose another place for it\n"
+
+
+def test_a_closed_standard_output_is_named() -> None:
+    command = f"{sys.executable} -m gateway run --source serial:/dev/ptmx --for 1 >&-"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "shadebus: standard output is closed: send it to a file, a pipe or /dev/null\n"
+
+
+def test_a_run_that_records_nothing_ends_without_a_word_when_its_reader_leaves() -> None:
+    pipe = f"{sys.executable} -m gateway run --source serial:/dev/ptmx | head -n 1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", pipe], capture_output=True, text=True, timeout=60, check=False)
+    assert done.stdout.endswith("  bridge0: OPENING\n")
+    assert (done.returncode, done.stderr) == (1, "no terrain given: scans and state only, no verdicts\n")
+
+
+def test_nobody_is_told_to_join_the_group_of_root() -> None:
+    mend = permission_mend(Path("/dev/null"))
+    assert mend.startswith(
+        """echo 'KERNEL=="null[0-9]*", GROUP="dialout", MODE="0660"' | sudo tee /etc/udev/rules.d/"""
+    )
+    assert "-aG root" not in mend
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives a file to a group that it is not in")
+def test_another_group_is_to_be_joined(tmp_path: Path) -> None:
+    os.chown(file(tmp_path, b""), -1, grp.getgrnam("tty").gr_gid)
+    assert permission_mend(tmp_path / "file") == "sudo usermod -aG tty $USER, then log in again"
 
 
 def test_a_directory_without_permission_is_named(tmp_path: Path) -> None:
