@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from gateway.config import RackConfig
 from gateway.core import Core, Emit
+from gateway.errors import GatewayError
 from gateway.events import Event
 from gateway.pipeline import Pipeline, Watcher
 from gateway.recording import Recording
@@ -29,7 +30,7 @@ def replay(
 
     `start_s` and `stop_s` count from the first record. What lies before `start_s` is fed all the same, since what comes
     later depends on it, but its events are not emitted. `stop` ends the replay between two records, without a summary.
-    Raises what `emit` raised.
+    Raises what `emit` raised, and GatewayError if `start_s` lies past the end.
     """
     begun = False
 
@@ -41,6 +42,7 @@ def replay(
     halt = stop or threading.Event()
     began_ns = time.monotonic_ns()
     first_ns: int | None = None
+    elapsed_s = 0.0
     for record in recording:
         first_ns = record.stamp.monotonic_ns if first_ns is None else first_ns
         elapsed_s = (record.stamp.monotonic_ns - first_ns) / 1e9
@@ -55,6 +57,9 @@ def replay(
         core.process(record)
         if core.unheard:
             raise core.unheard
+    else:
+        if first_ns is not None and not begun:
+            raise GatewayError(f"{recording.path} is only {elapsed_s:.1f} s long: start before its end")
     core.finish()
     if core.unheard:
         raise core.unheard

@@ -13,7 +13,8 @@ from gateway.errors import GatewayError
 from gateway.journal import Journal
 from gateway.metadata import describe
 from gateway.pipeline import Pipeline, Watcher
-from gateway.recording import Recorder
+from gateway.recording import Recorder, Recording
+from gateway.records import Raw
 from gateway.supervision import Supervisor
 from gateway.threads import GuardedThread
 from monitor.integrity import Monitor
@@ -63,6 +64,7 @@ class Service:
             errors = [error for s in self._supervisors if (error := s.first_error(FIRST_OPEN_S))]
             if errors:
                 self.stop()
+                self._forget_an_empty_recording()
                 raise GatewayError("; ".join(errors))
 
     @property
@@ -110,6 +112,11 @@ class Service:
         name = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ.mcap")
         self.recording_path = self._config.recording.directory / name
         return Recorder(self.recording_path, describe(self._config, monitor))
+
+    def _forget_an_empty_recording(self) -> None:
+        path = self.recording_path
+        if path and not any(isinstance(record, Raw) for record in Recording(path)):
+            path.unlink()
 
     def _thread(self, name: str, work: Callable[[], None]) -> GuardedThread:
         return GuardedThread(name, work, self._died)

@@ -2,6 +2,7 @@
 
 import grp
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from gateway.metadata import build_monitor, describe
 from gateway.recording import Recorder
 from simulators.outlets import PtyOutlet
 from tests.gateway.conftest import TERRAIN
+from tests.gateway.made import tick
 from tests.gateway.shell import GATEWAY, shadebus
 
 Arguments = list[str | Path]
@@ -34,6 +36,9 @@ if os.geteuid() == 0:
 main()
 """,
 )
+CHANNEL = """[adapters.channels.{}]
+kind = "arinc708"
+"""
 RACK = '[[adapters]]\nname = "bridge"\nsource = "serial:/dev/no-such-line"\n'
 
 
@@ -68,6 +73,19 @@ def without_calibration(directory: Path) -> Path:
     return directory / "odd.mcap"
 
 
+def scrap(directory: Path) -> Path:
+    (directory / "scrap.mcap").write_bytes(a_second(directory).read_bytes()[:20])
+    return directory / "scrap.mcap"
+
+
+def a_second(directory: Path) -> Path:
+    config = check_config({"adapters": [{"name": "a", "source": "serial:x"}]}, "test")
+    recorder = Recorder(directory / "a.mcap", describe(config, None))
+    recorder.append([tick(0, 0.0), tick(1, 1.0)])
+    recorder.close()
+    return recorder.path
+
+
 def source(*more: str | Path) -> Arguments:
     return ["run", "--source", "serial:/dev/no-such-line", *more]
 
@@ -99,6 +117,18 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
     "bad length": (lambda d: ["decode", "708", "b443"], ("2 bytes given, 8 or 200 needed",)),
     "unknown set": (lambda d: ["decode", "429", "1", "--set", "gps"], ("no definitions 'gps'", "gnss_743a")),
     "half a configuration": (lambda d: ["thresholds", "--n", "60"], ("give all of --n",)),
+    "source without port": (lambda d: ["run", "--source", "serial:socket://host"], ("socket://HOST:PORT",)),
+    "source port too high": (
+        lambda d: ["run", "--source", "serial:socket://127.0.0.1:99999"],
+        ("serial line socket://127.0.0.1:99999: write", "from 1 to 65535"),
+    ),
+    "channel too high": (lambda d: rack(d, RACK + CHANNEL.format(999)), ("channels.999", "less than or equal to 255")),
+    "channel below 0": (lambda d: rack(d, RACK + CHANNEL.format(-1)), ("channels.-1", "greater than or equal to 0")),
+    "scrap of a recording": (lambda d: ["info", scrap(d)], ("scrap.mcap is not", "it ends before its first record")),
+    "start past the end": (
+        lambda d: ["replay", "--start", "5", a_second(d)],
+        ("a.mcap is only 1.0 s long: start before its end",),
+    ),
     "no port": (lambda d: ["simulate", "--to", "tcp:x"], ("--to tcp:x: 'x' is no port", "use 1 to 65535")),
     "port too high": (lambda d: ["simulate", "--to", "tcp:99999"], ("'99999' is no port", "use 1 to 65535")),
     "full file": (
@@ -129,6 +159,40 @@ def test_a_line_without_permission_is_named_with_the_group_to_join() -> None:
     assert done.returncode == 1
     assert f"{line.path}: no permission: add yourself to the dialout group" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_start_that_failed_leaves_no_recording(tmp_path: Path) -> None:
+    assert shadebus(*source("--record", tmp_path)).returncode == 1
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_a_simulation_that_failed_leaves_no_file(tmp_path: Path) -> None:
+    scenario = file(
+        tmp_path,
+        b"""
+[flight]
+latitude_deg = 0.0
+longitude_deg = 0.0
+height_m = 761.0
+heading_deg = 197.6
+""",
+    )
+    done = shadebus("simulate", scenario, "--to", f"file:{tmp_path / 'out'}")
+    assert done.returncode == 1
+    assert done.stderr.startswith("shadebus: simulation: ")
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_simulation_that_nobody_reads_says_so_once_and_ends_when_told() -> None:
+    command = [*GATEWAY, "simulate", "--speed", "50"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as simulation:
+        assert simulation.stdout is not None and simulation.stderr is not None
+        place = simulation.stdout.readline().strip()
+        assert simulation.stderr.readline() == f"{place} is full: waiting for a reader\n"
+        simulation.send_signal(signal.SIGINT)
+        assert simulation.stderr.read() == ""
+        assert simulation.wait(20) == 0
 
 
 def test_terrain_without_permission_is_named(tmp_path: Path) -> None:
