@@ -1,5 +1,6 @@
 """Ctrl-C and SIGTERM end every verb soon, with the exit code that a shell expects and without a traceback."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -36,12 +37,21 @@ def long_recording(stream: bytes, tmp_path_factory: pytest.TempPathFactory) -> P
 def at_work(*arguments: str | Path) -> "subprocess.Popen[bytes]":
     """A verb whose kernels are loaded and whose handlers stand, as its open recording shows."""
     process = subprocess.Popen([*GATEWAY, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    files = Path(f"/proc/{process.pid}/fd")
-    deadline = time.monotonic() + 30
-    while not any(file.readlink().suffix == ".mcap" for file in files.iterdir() if file.is_symlink()):
-        assert time.monotonic() < deadline and process.poll() is None
-        time.sleep(0.005)
+    try:
+        wait_until(lambda: holds_a_recording(process.pid), "an open recording")
+    except BaseException:
+        process.kill()
+        process.communicate()
+        raise
     return process
+
+
+def holds_a_recording(process_id: int) -> bool:
+    for file in Path(f"/proc/{process_id}/fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # closed since it was listed
+            if file.readlink().suffix == ".mcap":
+                return True
+    return False
 
 
 @pytest.mark.parametrize(
