@@ -31,6 +31,7 @@ def _known_profile(name: str) -> str:
 
 DefinitionsName = Annotated[str, AfterValidator(_known_definitions)]
 ProfileName = Annotated[str, AfterValidator(_known_profile)]
+ChannelNumber = Annotated[int, Field(ge=0, le=255)]  # one byte of a packet
 
 
 class ChannelConfig(_Section):
@@ -50,7 +51,7 @@ class AdapterConfig(_Section):
         pattern=r"^[a-z0-9]+:.+", description="serial:DEVICE, serial:socket://..., serial:rfc2217://..."
     )
     baud: int = Field(921_600, ge=300, le=12_000_000, description="bit/s of a serial line")
-    channels: dict[int, ChannelConfig] = Field(default_factory=dict, description="by channel number")
+    channels: dict[ChannelNumber, ChannelConfig] = Field(default_factory=dict, description="by channel number")
 
 
 class RecordingConfig(_Section):

@@ -25,7 +25,7 @@ class Core:
         self._build = build
         self._emit = emit
         self._report = report
-        self._unheard = False
+        self.unheard: Exception | None = None  # why events reach nobody any more
         self._pipeline = build(None)
 
     def process(self, record: Record) -> None:
@@ -47,12 +47,12 @@ class Core:
 
     def _say(self, event: Event) -> None:
         """Emit, until that fails: an event that told of it would fail again, and so on for ever."""
-        if self._unheard:
+        if self.unheard:
             return
         try:
             self._emit(event)
         except Exception as error:  # noqa: BLE001 # whoever listens has left; recording and judging go on
-            self._unheard = True
+            self.unheard = error
             self._failed("events reach nobody any more", error)
 
     def _failed(self, what: str, error: Exception) -> None:

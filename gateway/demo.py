@@ -9,12 +9,15 @@ import math
 import signal
 import subprocess
 import sys
+import tempfile
+import time
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
-from threading import Event, Thread
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -32,6 +35,8 @@ from gateway.metadata import recorded_config, recorded_monitor
 from gateway.recording import Recording
 from gateway.replay import replay
 from gateway.report import Flown, Picture, write_report
+from gateway.stopping import Stop
+from gateway.threads import GuardedThread
 from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Monitor, Verdict
 from monitor.scans import Scan
 from monitor.terrain import open_terrain
@@ -44,6 +49,7 @@ GNSS_FAILS_S = 18.0
 P_FA = 1e-4
 COLOURS = {OK: "green", ALERT: "red", UNAVAILABLE: "yellow"}
 START_S, STOP_S = 60.0, 30.0  # a first start compiles the kernels
+POLL_S = 0.1
 CALIBRATION = Path(str(resources.files("simulators"))) / "data" / "demo_calibration.json"
 
 
@@ -58,6 +64,7 @@ class Leg:
     faults: tuple[dict[str, Any], ...] = ()
     lines: list[str] = field(default_factory=list)
     listening: Event = field(default_factory=Event)
+    deaf: list[BaseException] = field(default_factory=list)  # why nobody listens to the gateway any more
     recording: Path = Path()
     identical: bool = False
 
@@ -81,12 +88,19 @@ class Leg:
         return str(self.verdicts[-1]["verdict"]) if self.verdicts else "none"
 
 
-def fly(out: Path, seed: int, speed: float) -> None:
-    """Fly the legs, print the table, write the report. Raises GatewayError if anything is not as it must be."""
+def fly(out: Path, seed: int, speed: float, stop: Stop) -> None:
+    """Fly the legs, print the table, write the report; `stop` ends all of it, the gateway's process included.
+
+    Raises GatewayError if anything is not as it must be.
+    """
     from simulators.scenario import BUILT_IN_TERRAIN
 
     console = Console()
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=out).close()
+    except OSError as error:
+        raise GatewayError(f"cannot write to {out}: {error.strerror}; choose another directory with --out") from error
     true_terrain = BUILT_IN_TERRAIN["white_mountains"]
     shifted = shift_terrain(true_terrain, out / "shifted_500m_east.tif", east_m=SHIFT_EAST_M)
     failing = ({"name": "gnss_no_computed_data", "start_s": GNSS_FAILS_S},)
@@ -101,8 +115,8 @@ def fly(out: Path, seed: int, speed: float) -> None:
     warm_up(Monitor(open_terrain(true_terrain)))  # or the first gateway compiles before it hears anything
     flown = []
     for leg in legs:
-        _live(leg, out, seed, speed, console)
-        flown.append(_again(leg))
+        _live(leg, out, seed, speed, console, stop)
+        flown.append(_again(leg, stop))
     _table(legs, console)
     report = write_report(out / "report", flown)
     console.print(f"recordings in {out}, report in {report}")
@@ -132,7 +146,7 @@ def shift_terrain(terrain: Path, target: Path, *, east_m: float = 0.0, north_m: 
     return target
 
 
-def _live(leg: Leg, out: Path, seed: int, speed: float, console: Console) -> None:
+def _live(leg: Leg, out: Path, seed: int, speed: float, console: Console, stop: Stop) -> None:
     from simulators.outlets import PtyOutlet
     from simulators.player import play
     from simulators.scenario import Fault, white_mountains
@@ -143,22 +157,46 @@ def _live(leg: Leg, out: Path, seed: int, speed: float, console: Console) -> Non
     with PtyOutlet() as line:
         config = out / f"{leg.name}.toml"
         config.write_text(_rack(line.path, leg.terrain, out / leg.name))
-        command = [sys.executable, "-m", "gateway", "run", "-c", str(config), "--json"]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as gateway, Progress(console=console) as bar:  # noqa: S603 # our own command
-            reader = Thread(target=_listen, args=(leg, gateway, console))
-            reader.start()
+        longest_s = START_S + LEG_S / speed + STOP_S
+        with Progress(console=console) as bar, _gateway(leg, config, longest_s, console) as gateway:
             task = bar.add_task(leg.title, total=math.ceil(LEG_S))
-            if not leg.listening.wait(START_S):
-                gateway.kill()
-                raise GatewayError(f"leg {leg.title}: the gateway did not open its line within {START_S:.0f} s")
-            play(_shown(traffic(scenario), bar, task), line, speed)
+            _wait_until_it_listens(leg, gateway, stop)
+            play(stop.until(_shown(traffic(scenario), leg, bar, task)), line, speed)
             line.drain()
             gateway.send_signal(signal.SIGTERM)
             code = gateway.wait(STOP_S)
-            reader.join()
     if code:
         raise GatewayError(f"leg {leg.title}: the gateway ended with exit code {code}")
     leg.recording = max((out / leg.name).glob("*.mcap"))
+
+
+@contextmanager
+def _gateway(leg: Leg, config: Path, longest_s: float, console: Console) -> "Iterator[subprocess.Popen[str]]":
+    """The shipped gateway as a process that does not outlive the block, nor `longest_s` if the demo itself is killed.
+
+    Ctrl-C at the terminal does not reach it, so that it ends in one way only.
+    """
+    command = [sys.executable, "-m", "gateway", "run", "-c", str(config), "--json", "--for", f"{longest_s:.0f}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, process_group=0) as gateway:  # noqa: S603 # our own command
+        reader = GuardedThread(
+            "reader", lambda: _listen(leg, gateway, console), lambda _, error: leg.deaf.append(error)
+        )
+        reader.start()
+        try:
+            yield gateway
+        finally:
+            gateway.kill()  # has no effect on one that has ended
+            reader.join()
+
+
+def _wait_until_it_listens(leg: Leg, gateway: "subprocess.Popen[str]", stop: Stop) -> None:
+    deadline = time.monotonic() + START_S
+    while not leg.listening.wait(POLL_S):
+        stop.obey()
+        if gateway.poll() is not None:
+            raise GatewayError(f"leg {leg.title}: the gateway ended with exit code {gateway.returncode}")
+        if time.monotonic() > deadline:
+            raise GatewayError(f"leg {leg.title}: the gateway did not open its line within {START_S:.0f} s")
 
 
 def _rack(device: str, terrain: Path, directory: Path) -> str:
@@ -181,6 +219,8 @@ def _rack(device: str, terrain: Path, directory: Path) -> str:
 def _listen(leg: Leg, gateway: "subprocess.Popen[str]", console: Console) -> None:
     """Keep every event line, and show verdicts as they come."""
     for line in gateway.stdout or ():
+        if not line.endswith("\n"):
+            break  # cut short by a kill
         leg.lines.append(line)
         event = json.loads(line)
         if event["type"] == "status" and event["state"] == "UP":
@@ -195,15 +235,17 @@ def _listen(leg: Leg, gateway: "subprocess.Popen[str]", console: Console) -> Non
             )
 
 
-def _shown(packets: Iterator[tuple[int, bytes]], bar: Progress, task: TaskID) -> Iterator[tuple[int, bytes]]:
-    """The same packets, and the bar moved to their time."""
+def _shown(packets: Iterator[tuple[int, bytes]], leg: Leg, bar: Progress, task: TaskID) -> Iterator[tuple[int, bytes]]:
+    """The same packets, and the bar moved to their time; raises what has ended the listening."""
     for time_ns, data in packets:
+        if leg.deaf:
+            raise leg.deaf[0]
         bar.update(task, completed=time_ns / 1e9)
         yield time_ns, data
     bar.update(task, completed=math.ceil(LEG_S))
 
 
-def _again(leg: Leg) -> Flown:
+def _again(leg: Leg, stop: Stop) -> Flown:
     """Replay the leg's recording, compare the events with the live ones, and keep what the report needs."""
     recording = Recording(leg.recording)
     config = recorded_config(recording.metadata)
@@ -218,7 +260,8 @@ def _again(leg: Leg) -> Flown:
         complete_ns = replayed[-1].time_ns  # the event before a verdict says that its scan is complete
         pictures.append(Picture(complete_ns, scan, verdict, comparison))
 
-    replay(recording, config, monitor, replayed.append, failures.append, watcher=watch)
+    replay(recording, config, monitor, replayed.append, failures.append, watcher=watch, stop=stop)
+    stop.obey()
     leg.identical = [event.to_json() + "\n" for event in replayed] == leg.lines and not failures
     return Flown(leg.title, recording, monitor, replayed[0].time_ns, replayed[-1].time_ns, pictures)
 

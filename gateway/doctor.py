@@ -10,12 +10,16 @@ import time
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from string import digits
 from typing import NamedTuple
 
 from serial.tools import list_ports
 
+from gateway import kernel_cache
+
 FREE_BYTES = 10 << 30  # hours of a full rack
 SLOWEST_SYNC_S = 0.5
+OPEN_GROUP = "dialout"
 LIBRARIES = ("numba", "rasterio", "pyproj", "scipy", "mcap", "serial", "can", "usb", "libusb_package")
 
 
@@ -59,10 +63,8 @@ def _libraries() -> Finding:
 
 
 def _kernel_cache() -> Finding:
-    place = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).parent.parent / "monitor")
-    good = os.access(place, os.W_OK)
-    mend = "set NUMBA_CACHE_DIR to a directory you can write, or every start compiles for half a minute"
-    return Finding("kernel cache", good, str(place), mend)
+    place = kernel_cache.place()
+    return Finding("kernel cache", place is not None, str(place or "no directory can be written"), kernel_cache.MEND)
 
 
 def _serial_ports() -> Finding:
@@ -74,11 +76,21 @@ def _serial_permission() -> Finding:
     closed = [port.device for port in list_ports.comports() if not os.access(port.device, os.R_OK | os.W_OK)]
     if not closed:
         return Finding("serial permission", True, "every line that is there can be opened")
+    return Finding("serial permission", False, ", ".join(closed), permission_mend(Path(closed[0])))
+
+
+def permission_mend(device: Path) -> str:
+    """The command that lets this user open a device: joining its group, or a udev rule where that is root's."""
     try:
-        group = grp.getgrgid(Path(closed[0]).stat().st_gid).gr_name
+        group = grp.getgrgid(device.stat().st_gid).gr_name
     except (KeyError, OSError):
-        group = "dialout"
-    return Finding("serial permission", False, ", ".join(closed), f"sudo usermod -aG {group} $USER, then log in again")
+        group = OPEN_GROUP
+    join = f"sudo usermod -aG {OPEN_GROUP if group == 'root' else group} $USER, then log in again"
+    if group != "root":
+        return join
+    rule = f'KERNEL=="{device.name.rstrip(digits)}[0-9]*", GROUP="{OPEN_GROUP}", MODE="0660"'
+    load = "sudo udevadm control --reload && sudo udevadm trigger"
+    return f"echo '{rule}' | sudo tee /etc/udev/rules.d/70-shadebus.rules && {load} && {join}"
 
 
 def _room(directory: Path) -> Finding:

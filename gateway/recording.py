@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from io import BufferedReader
 from pathlib import Path
 
-from mcap.exceptions import McapError
+from mcap.exceptions import InvalidMagic, McapError
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
@@ -144,7 +144,8 @@ class Recording:
                     raise GatewayError(f"{path} is an MCAP file, but not a shadebus recording")
                 self.metadata = getattr(next(items, None), "metadata", {})
             except (*TORN, StopIteration) as error:
-                raise GatewayError(f"{path} is not a shadebus recording: {str(error) or 'it is too short'}") from error
+                why = str(error) if isinstance(error, InvalidMagic) else "it ends before its first record"
+                raise GatewayError(f"{path} is not a shadebus recording: {why}; look for another copy") from error
 
     def __iter__(self) -> Iterator[Record]:
         self.records, self.damaged, self.torn = 0, 0, ""

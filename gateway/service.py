@@ -13,7 +13,8 @@ from gateway.errors import GatewayError
 from gateway.journal import Journal
 from gateway.metadata import describe
 from gateway.pipeline import Pipeline, Watcher
-from gateway.recording import Recorder
+from gateway.recording import Recorder, Recording
+from gateway.records import Raw
 from gateway.supervision import Supervisor
 from gateway.threads import GuardedThread
 from monitor.integrity import Monitor
@@ -39,7 +40,7 @@ class Service:
         sync_s = config.recording.sync_interval_s if config.recording else 1.0
         self._to_core = CoreQueue(lambda reason: self._journal.report("core", "BEHIND", reason))
         self._journal = Journal(recorder, self._to_core.deliver, limit_bytes, sync_s)
-        core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, self._core_failed)
+        self._core = core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, self._core_failed)
 
         def core_work() -> None:
             if monitor:
@@ -63,7 +64,13 @@ class Service:
             errors = [error for s in self._supervisors if (error := s.first_error(FIRST_OPEN_S))]
             if errors:
                 self.stop()
+                self._forget_an_empty_recording()
                 raise GatewayError("; ".join(errors))
+
+    @property
+    def deserted(self) -> Exception | None:
+        """Why the service has nobody left to work for: its events are not heard, and it does not record."""
+        return None if self.recording_path else self._core.unheard
 
     @property
     def stuck(self) -> bool:
@@ -106,6 +113,11 @@ class Service:
         self.recording_path = self._config.recording.directory / name
         return Recorder(self.recording_path, describe(self._config, monitor))
 
+    def _forget_an_empty_recording(self) -> None:
+        path = self.recording_path
+        if path and not any(isinstance(record, Raw) for record in Recording(path)):
+            path.unlink()
+
     def _thread(self, name: str, work: Callable[[], None]) -> GuardedThread:
         return GuardedThread(name, work, self._died)
 
@@ -113,6 +125,8 @@ class Service:
         if len(self.failures) < MOST_FAILURES:  # the recording has them all
             self.failures.append(f"core: {reason}")
         self._journal.report("core", "FAILED", reason)
+        if self.deserted:
+            self.broken.set()
 
     def _died(self, name: str, error: BaseException) -> None:
         reason = f"{type(error).__name__}: {error}"

@@ -1,6 +1,7 @@
 """One thread per adapter: open, read until it fails, say so, wait, open again, for ever.
 
-CLOSED -> OPENING -> UP -> LOST -> OPENING ... Every change is a recorded status with its reason.
+CLOSED -> OPENING -> UP -> LOST -> OPENING ... Every change is a recorded status with its reason. A line that cannot be
+opened again stays lost for the reason that it was lost for first; attempts since then are counted beside it.
 """
 
 import contextlib
@@ -27,6 +28,7 @@ class Supervisor:
         self._stopping = threading.Event()
         self._first_open = threading.Event()
         self._first_error = ""
+        self._lost_for, self._attempts = "", 0  # since the line was last up
 
     def run(self) -> None:
         """The work of the adapter's thread, until `stop`."""
@@ -38,11 +40,12 @@ class Supervisor:
             except Exception as error:  # noqa: BLE001 # drivers raise anything, and none of it may end the thread
                 self._first_error = self._first_error or _reason(error)
                 self._first_open.set()
-                self._state("LOST", _reason(error))
+                self._lose(_reason(error))
                 self._stopping.wait(wait_s)
                 wait_s = min(2 * wait_s, LONGEST_WAIT_S)
                 continue
             self._first_open.set()
+            self._lost_for, self._attempts = "", 0
             self._state("UP")
             gave = self._read(port)
             wait_s = FIRST_WAIT_S if gave else min(2 * wait_s, LONGEST_WAIT_S)
@@ -68,11 +71,20 @@ class Supervisor:
                     self._deliver(self.name, chunk)
                     gave = True
         except Exception as error:  # noqa: BLE001 # pyserial alone raises four unrelated kinds on unplugging
-            self._state("LOST", _reason(error))
+            self._lose(_reason(error))
         finally:
             with contextlib.suppress(Exception):  # the line is given up, whatever its driver says to that
                 port.close()
         return gave
+
+    def _lose(self, reason: str) -> None:
+        if not self._lost_for:
+            self._lost_for = reason
+            self._state("LOST", reason)
+            return
+        self._attempts += 1
+        latest = f": {reason}" if reason != self._lost_for else ""
+        self._state("LOST", f"{self._lost_for} (attempt {self._attempts} to open it again failed{latest})")
 
     def _state(self, state: str, reason: str = "") -> None:
         self._report(self.name, state, reason)

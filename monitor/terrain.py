@@ -72,9 +72,10 @@ def open_terrain(path_or_paths: str | Path | Sequence[str | Path]) -> Terrain:
 
 
 def _read(path: Path) -> Grid:
-    if not path.is_file():
-        raise TerrainError(f"terrain file {path} does not exist: check the path in the configuration or --dem")
     try:
+        if not path.is_file():
+            raise TerrainError(f"terrain file {path} does not exist: check the path in the configuration or --dem")
+        path.open("rb").close()
         with rasterio.open(path) as source:
             if source.crs is None:
                 raise TerrainError(f"{path} has no coordinate reference system: assign one with gdal_edit.py -a_srs")
@@ -84,7 +85,9 @@ def _read(path: Path) -> Grid:
             warp = {"crs": WGS84, "resampling": Resampling.bilinear, "nodata": math.nan, "dtype": "float32"}
             with WarpedVRT(source, **warp) as geographic:
                 return _grid(geographic)
-    except RasterioError as error:
+    except PermissionError as error:
+        raise TerrainError(f"terrain file {path} may not be read: give this user the right to read it") from error
+    except (RasterioError, OSError) as error:
         raise TerrainError(f"{path} cannot be read as terrain (GeoTIFF, HGT or DTED): {error}") from error
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import fcntl
+import math
 import os
 import select
 import socket
@@ -10,12 +11,16 @@ import termios
 import threading
 import time
 import tty
+from collections.abc import Callable
+from io import BufferedWriter
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
 
 POLL_S = 0.1
+LAST_PORT = 65_535
 DRAIN_S = 1.0
+STALL_S = 2.0  # no reader in its senses takes so long for 4 kB
 
 
 class Closed(Exception):
@@ -51,20 +56,23 @@ class PtyOutlet(_Closing):
     """A raw pseudo-terminal that looks like a serial port: open `path` to read.
 
     The kernel holds about 4 kB; when that is full, `write` waits. The subordinate end stays open here,
-    so that readers may come and go.
+    so that readers may come and go. `on_stall` is called once for each write that finds nobody reading.
     """
 
     def __init__(self) -> None:
+        self.on_stall: Callable[[], None] = lambda: None
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
+        self.place = f"serial:{self.path}"
         self._closing = threading.Event()
         self._lock = threading.Lock()
 
     def write(self, data: bytes) -> None:
         """Write every byte, however long the reader takes; raises Closed once `close` was called."""
         rest = memoryview(data)
+        stalled_s = time.monotonic() + STALL_S
         while rest:
             with self._lock:
                 if self._closing.is_set():
@@ -73,6 +81,9 @@ class PtyOutlet(_Closing):
                 if ready:
                     with contextlib.suppress(BlockingIOError):
                         rest = rest[os.write(self._master, rest) :]
+            if rest and time.monotonic() > stalled_s:
+                stalled_s = math.inf
+                self.on_stall()
 
     def close(self) -> None:
         """Wait up to a second for the reader to empty the terminal, because closing it discards what is inside."""
@@ -103,6 +114,7 @@ class TcpOutlet(_Closing):
         self._listener = socket.create_server(("127.0.0.1", port))
         self._listener.settimeout(POLL_S)
         self.address: tuple[str, int] = self._listener.getsockname()
+        self.place = "serial:socket://{}:{}".format(*self.address)
         self._client: socket.socket | None = None
         self._closing = threading.Event()
 
@@ -137,15 +149,36 @@ class TcpOutlet(_Closing):
 
 
 class FileOutlet(_Closing):
-    """The stream as a file, made anew."""
+    """The stream as a file, made anew when the first packet is there to be written."""
 
     def __init__(self, path: Path) -> None:
-        self._file = path.open("wb")
+        self.place = ""
+        self._path = path
+        self._file: BufferedWriter | None = None
 
     def write(self, data: bytes) -> None:
         """Append to the file; raises OSError when it cannot."""
+        self._file = self._file or self._path.open("wb")
         self._file.write(data)
 
     def close(self) -> None:
-        """Finish the file."""
-        self._file.close()
+        """Finish the file. Raises OSError when it cannot."""
+        if self._file:
+            self._file.close()
+
+
+def named(text: str) -> PtyOutlet | TcpOutlet | FileOutlet:
+    """The outlet of `pty`, `tcp:PORT` or `file:PATH`; its `place` is what a gateway calls it, if it can listen to it.
+
+    Raises ValueError for any other text, and OSError where the system does not grant it.
+    """
+    kind, _, address = text.partition(":")
+    if kind == "pty":
+        return PtyOutlet()
+    if kind == "tcp":
+        if address and not (address.isdecimal() and int(address) <= LAST_PORT):
+            raise ValueError(f"{address!r} is no port: use 1 to {LAST_PORT}, or 0 for a free one")
+        return TcpOutlet(int(address or "0"))
+    if kind == "file" and address:
+        return FileOutlet(Path(address))
+    raise ValueError("use pty, tcp:PORT or file:PATH")

@@ -83,12 +83,14 @@ def test_the_command_line_imports_its_work_lazily() -> None:
     eager = {item.module for item in imports("gateway") if item.file.startswith("gateway/cli/") and not item.lazy}
     assert {module for module in eager if module.startswith("gateway")} <= {
         "gateway.errors",
+        "gateway.kernel_cache",
         *(f"gateway.cli.{path.stem}" for path in (ROOT / "gateway" / "cli").glob("*.py")),
     }
     assert {module.partition(".")[0] for module in eager} <= {
         "gateway",
         "typer",
         "typing",
+        "collections",
         "os",
         "pathlib",
         "sys",

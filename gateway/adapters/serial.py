@@ -5,6 +5,7 @@ import errno
 import select
 from queue import Empty
 from typing import Any
+from urllib.parse import urlsplit
 
 import serial
 
@@ -13,6 +14,7 @@ from gateway.errors import GatewayError
 
 LONGEST_WAIT_S = 0.2  # so that a silent line still notices the order to stop
 LARGEST_READ = 65_536
+REMOTE = ("socket", "rfc2217")
 
 MENDS = {
     errno.ENOENT: "no such device: plug it in, or see `ls /dev/serial/by-id` for its name",
@@ -97,5 +99,14 @@ def _keep() -> None:
 
 
 def make(address: str, config: AdapterConfig) -> SerialAdapter:
-    """The adapter of a `serial:` source."""
+    """The adapter of a `serial:` source. Raises GatewayError for the address of a server that cannot be one."""
+    scheme, _, _ = address.partition("://")
+    if scheme in REMOTE:
+        try:
+            parts = urlsplit(address)
+            whole = bool(parts.hostname and parts.port)
+        except ValueError:  # a port that is no number, or above 65535
+            whole = False
+        if not whole:
+            raise GatewayError(f"serial line {address}: write {scheme}://HOST:PORT with a port from 1 to 65535")
     return SerialAdapter(address, config.baud)

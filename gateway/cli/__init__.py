@@ -1,9 +1,12 @@
 """The command line: `shadebus VERB`. Each verb is one module, which imports what it needs when it runs."""
 
+import os
 import sys
+from collections.abc import Callable
 
 import typer
 
+from gateway import kernel_cache
 from gateway.cli.decode import decode_429, decode_708
 from gateway.cli.demo import demo
 from gateway.cli.doctor import doctor
@@ -32,11 +35,32 @@ app.add_typer(decode, name="decode")
 
 def main() -> None:
     """Run the command line; an error that its user can mend is one line on stderr and exit code 1."""
+    if sys.stdout is None:  # and the next file to be opened would take its place
+        sys.exit("shadebus: standard output is closed: send it to a file, a pipe or /dev/null")
+    kernel_cache.choose()
+    code, complaint = _end_of(app)
+    flushed, unflushed = _end_of(sys.stdout.flush)
+    if flushed:  # or Python tries again on its way out, and prints a traceback
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if complaint or unflushed:
+        print(f"shadebus: {complaint or unflushed}", file=sys.stderr)
+    sys.exit(code or flushed)
+
+
+def _end_of(work: Callable[[], object]) -> tuple[int | str | None, str]:
+    """The exit code of some work and, if that alone does not explain it, a sentence that does."""
     try:
-        app()
+        work()
+    except SystemExit as end:
+        return end.code, ""
     except GatewayError as error:
-        print(f"shadebus: {error}", file=sys.stderr)
-        sys.exit(1)
+        return 1, str(error)
     except BrokenPipeError:  # the reader of our output has seen enough
-        sys.stderr.close()
-        sys.exit(1)
+        return 1, ""
+    except OSError as error:
+        return 1, f"{error.filename or 'standard output'}: {error.strerror or error}; choose another place for it"
+    except RuntimeError as error:
+        if "no locator available" not in str(error):
+            raise
+        return 1, f"no directory takes the compiled kernels: {kernel_cache.MEND}"
+    return 0, ""

@@ -7,7 +7,13 @@ import typer
 
 
 def info(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) -> None:
-    """Print times, adapters, counters, versions and the state of the file."""
+    """Print times, adapters, counters, versions and the state of the file.
+
+    Ctrl-C ends it early with exit code 130, SIGTERM with 143.
+    """
+    from gateway.stopping import Stop
+
+    stop = Stop()  # before the imports that take their time
     from rich.console import Console
     from rich.table import Table
 
@@ -22,7 +28,7 @@ def info(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
     pipeline = Pipeline(config, None)
     first = last = None
     raw_bytes = 0
-    for record in source:
+    for record in stop.until(source):
         first, last = first or record.stamp, record.stamp
         raw_bytes += len(record.data) if isinstance(record, Raw) else 0
         for _ in pipeline.feed(record):

@@ -11,11 +11,17 @@ def replay(
     recording: Annotated[Path, typer.Argument(help="recording (MCAP)")],
     speed: Annotated[float | None, typer.Option(min=0.001, help="times real time; as fast as possible if left")] = None,
     start: Annotated[float, typer.Option(min=0, help="seconds from the first record")] = 0.0,
-    stop: Annotated[float | None, typer.Option(min=0, help="seconds from the first record")] = None,
+    until: Annotated[float | None, typer.Option("--stop", min=0, help="seconds from the first record")] = None,
     json: Annotated[bool, typer.Option("--json", help="events as JSON lines, the same bytes as live")] = False,
     dem: Annotated[list[Path] | None, typer.Option(help="terrain instead of the recorded one; repeatable")] = None,
 ) -> None:
-    """Replay a recording exactly."""
+    """Replay a recording exactly.
+
+    Ctrl-C ends it early with exit code 130, SIGTERM with 143.
+    """
+    from gateway.stopping import Stop
+
+    stop = Stop()  # before the imports that take their time
     from gateway.console import print_json, print_line
     from gateway.errors import GatewayError
     from gateway.metadata import recorded_config, recorded_monitor
@@ -27,7 +33,8 @@ def replay(
     monitor = recorded_monitor(source.metadata, config, tuple(dem or ()))
     failures: list[str] = []
     emit = print_json if json else print_line
-    play(source, config, monitor, emit, failures.append, speed=speed, start_s=start, stop_s=stop)
+    play(source, config, monitor, emit, failures.append, speed=speed, start_s=start, stop_s=until, stop=stop)
+    stop.obey()
     if source.torn:
         print(f"shadebus: {recording}: {source.torn}; every whole record was replayed", file=sys.stderr)
     if source.damaged:

@@ -1,9 +1,7 @@
 """`shadebus run`: the service."""
 
 import os
-import signal
 import sys
-import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +18,10 @@ def run(
     seconds: Annotated[float | None, typer.Option("--for", help="stop after so many seconds")] = None,
     wait: Annotated[bool, typer.Option("--wait", help="start although a device is not there yet")] = False,
 ) -> None:
-    """Listen to the buses, record every byte, and judge the terrain live."""
+    """Listen to the buses, record every byte, and judge the terrain live; Ctrl-C or SIGTERM ends it in good order."""
+    from gateway.stopping import Stop
+
+    stop = Stop(patience_s=None)  # what was read is written down first
     from gateway.config import RackConfig, check_config, load_config
     from gateway.console import print_json, print_line
     from gateway.errors import GatewayError
@@ -49,9 +50,6 @@ def run(
         changes["wait_for_devices"] = True
     rack = check_config({**rack.model_dump(), **changes}, "options")
 
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
     service = Service(rack, build_monitor(rack), print_json if json else print_line)
     if not rack.terrain:
         print("no terrain given: scans and state only, no verdicts", file=sys.stderr)
@@ -61,5 +59,7 @@ def run(
     if service.stuck:  # it holds stdout, so an orderly exit would wait for it too
         print(f"shadebus: {'; '.join(service.failures)}", file=sys.stderr, flush=True)
         os._exit(1)
+    if service.deserted:
+        raise service.deserted
     if service.failures:
         raise GatewayError("; ".join(service.failures))

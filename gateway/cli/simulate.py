@@ -1,6 +1,6 @@
 """`shadebus simulate`: a simulated flight as byte-exact bus traffic."""
 
-import signal
+import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +14,13 @@ def simulate(
     seed: Annotated[int | None, typer.Option(min=0, help="instead of the scenario's")] = None,
     duration: Annotated[float | None, typer.Option(min=1, help="seconds of the first leg, instead of its own")] = None,
 ) -> None:
-    """Send the traffic of a bridge with a weather radar, an IRU, a GNSS receiver and a radio altimeter."""
+    """Send the traffic of a bridge with a weather radar, an IRU, a GNSS receiver and a radio altimeter.
+
+    Ctrl-C or SIGTERM ends it in good order.
+    """
+    from gateway.stopping import Stop
+
+    stop = Stop()  # before the imports that take their time
     from gateway.errors import GatewayError
     from simulators import outlets
     from simulators.player import play
@@ -30,31 +36,29 @@ def simulate(
     if seed is not None:
         plan = plan.model_copy(update={"seed": seed})
 
-    kind, _, address = to.partition(":")
-    outlet: outlets.PtyOutlet | outlets.TcpOutlet | outlets.FileOutlet
     try:
-        if kind == "pty":
-            outlet = outlets.PtyOutlet()
-            typer.echo(f"serial:{outlet.path}")
-        elif kind == "tcp":
-            outlet = outlets.TcpOutlet(int(address or "0"))
-            typer.echo("serial:socket://{}:{}".format(*outlet.address))
-        elif kind == "file" and address:
-            outlet = outlets.FileOutlet(Path(address))
-            speed = float("inf")
-        else:
-            raise GatewayError(f"--to {to}: use pty, tcp:PORT or file:PATH")
-    except (OSError, ValueError, OverflowError) as error:
-        raise GatewayError(f"--to {to}: {error}") from error
-
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with outlet:
-        try:
-            played = play(traffic(plan), outlet, speed)
-        except (OSError, ValueError) as error:
-            raise GatewayError(f"simulation: {error}") from error
-        except KeyboardInterrupt:  # the usual end of a simulation, also while it waits for a reader
-            return
+        outlet = outlets.named(to)
+    except (OSError, ValueError) as error:
+        told = f"{error.strerror}: choose another" if isinstance(error, OSError) else error
+        raise GatewayError(f"--to {to}: {told}") from error
+    if outlet.place:
+        typer.echo(outlet.place)
+    if isinstance(outlet, outlets.FileOutlet):
+        speed = float("inf")
+    if isinstance(outlet, outlets.PtyOutlet):
+        outlet.on_stall = lambda: typer.echo(f"{outlet.place} is full: waiting for a reader", err=True)
+    threading.Thread(target=lambda: stop.wait() and outlet.close(), daemon=True).start()  # also while it waits
+    try:
+        with outlet:
+            played = play(traffic(plan), outlet, speed, stop)
+    except OSError as error:  # from the system, or in words from what reads the terrain
+        place = error.filename or f"--to {to}"
+        told = f"{place}: {error.strerror}: choose another" if error.strerror else f"simulation: {error}"
+        raise GatewayError(told) from error
+    except ValueError as error:
+        raise GatewayError(f"simulation: {error}") from error
+    if stop.is_set():
+        return
     typer.echo(
         f"{played.packets} packets, {played.size_bytes} bytes, at worst {played.worst_lateness_s * 1e3:.1f} ms late",
         err=True,

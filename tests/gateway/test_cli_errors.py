@@ -1,5 +1,8 @@
 """A mistake at the command line is one line on stderr that names the thing and the mend, and a non-zero exit."""
 
+import grp
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -9,11 +12,13 @@ import pytest
 from mcap.writer import Writer
 
 from gateway.config import check_config
+from gateway.doctor import permission_mend
 from gateway.metadata import build_monitor, describe
 from gateway.recording import Recorder
 from simulators.outlets import PtyOutlet
 from tests.gateway.conftest import TERRAIN
-from tests.gateway.shell import shadebus
+from tests.gateway.made import tick
+from tests.gateway.shell import GATEWAY, shadebus
 
 Arguments = list[str | Path]
 # Nothing is forbidden to root, so the command gives its rights up, once it has loaded what only root may read.
@@ -31,6 +36,9 @@ if os.geteuid() == 0:
 main()
 """,
 )
+CHANNEL = """[adapters.channels.{}]
+kind = "arinc708"
+"""
 RACK = '[[adapters]]\nname = "bridge"\nsource = "serial:/dev/no-such-line"\n'
 
 
@@ -65,6 +73,19 @@ def without_calibration(directory: Path) -> Path:
     return directory / "odd.mcap"
 
 
+def scrap(directory: Path) -> Path:
+    (directory / "scrap.mcap").write_bytes(a_second(directory).read_bytes()[:20])
+    return directory / "scrap.mcap"
+
+
+def a_second(directory: Path) -> Path:
+    config = check_config({"adapters": [{"name": "a", "source": "serial:x"}]}, "test")
+    recorder = Recorder(directory / "a.mcap", describe(config, None))
+    recorder.append([tick(0, 0.0), tick(1, 1.0)])
+    recorder.close()
+    return recorder.path
+
+
 def source(*more: str | Path) -> Arguments:
     return ["run", "--source", "serial:/dev/no-such-line", *more]
 
@@ -96,6 +117,25 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
     "bad length": (lambda d: ["decode", "708", "b443"], ("2 bytes given, 8 or 200 needed",)),
     "unknown set": (lambda d: ["decode", "429", "1", "--set", "gps"], ("no definitions 'gps'", "gnss_743a")),
     "half a configuration": (lambda d: ["thresholds", "--n", "60"], ("give all of --n",)),
+    "source without port": (lambda d: ["run", "--source", "serial:socket://host"], ("socket://HOST:PORT",)),
+    "source port too high": (
+        lambda d: ["run", "--source", "serial:socket://127.0.0.1:99999"],
+        ("serial line socket://127.0.0.1:99999: write", "from 1 to 65535"),
+    ),
+    "channel too high": (lambda d: rack(d, RACK + CHANNEL.format(999)), ("channels.999", "less than or equal to 255")),
+    "channel below 0": (lambda d: rack(d, RACK + CHANNEL.format(-1)), ("channels.-1", "greater than or equal to 0")),
+    "scrap of a recording": (lambda d: ["info", scrap(d)], ("scrap.mcap is not", "it ends before its first record")),
+    "start past the end": (
+        lambda d: ["replay", "--start", "5", a_second(d)],
+        ("a.mcap is only 1.0 s long: start before its end",),
+    ),
+    "no port": (lambda d: ["simulate", "--to", "tcp:x"], ("--to tcp:x: 'x' is no port", "use 1 to 65535")),
+    "port too high": (lambda d: ["simulate", "--to", "tcp:99999"], ("'99999' is no port", "use 1 to 65535")),
+    "full file": (
+        lambda d: ["simulate", "--to", "file:/dev/full", "--duration", "1"],
+        ("--to file:/dev/full: No space left on device: choose another",),
+    ),
+    "demo without a place": (lambda d: ["demo", "--out", "/proc/no"], ("cannot write to /proc/no", "with --out")),
     "unknown outlet": (lambda d: ["simulate", "--to", "tin"], ("--to tin: use pty, tcp:PORT or file:PATH",)),
 }
 
@@ -119,6 +159,88 @@ def test_a_line_without_permission_is_named_with_the_group_to_join() -> None:
     assert done.returncode == 1
     assert f"{line.path}: no permission: add yourself to the dialout group" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_start_that_failed_leaves_no_recording(tmp_path: Path) -> None:
+    assert shadebus(*source("--record", tmp_path)).returncode == 1
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_a_simulation_that_failed_leaves_no_file(tmp_path: Path) -> None:
+    scenario = file(
+        tmp_path,
+        b"""
+[flight]
+latitude_deg = 0.0
+longitude_deg = 0.0
+height_m = 761.0
+heading_deg = 197.6
+""",
+    )
+    done = shadebus("simulate", scenario, "--to", f"file:{tmp_path / 'out'}")
+    assert done.returncode == 1
+    assert done.stderr.startswith("shadebus: simulation: ")
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_simulation_that_nobody_reads_says_so_once_and_ends_when_told() -> None:
+    command = [*GATEWAY, "simulate", "--speed", "50"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as simulation:
+        assert simulation.stdout is not None and simulation.stderr is not None
+        place = simulation.stdout.readline().strip()
+        assert simulation.stderr.readline() == f"{place} is full: waiting for a reader\n"
+        simulation.send_signal(signal.SIGINT)
+        assert simulation.stderr.read() == ""
+        assert simulation.wait(20) == 0
+
+
+def test_terrain_without_permission_is_named(tmp_path: Path) -> None:
+    (tmp_path / "closed").mkdir(mode=0)
+    dem = tmp_path / "closed" / "a.hgt"
+    done = subprocess.run(
+        [*AS_NOBODY, *map(str, source("--dem", dem))], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr == f"shadebus: terrain file {dem} may not be read: give this user the right to read it\n"
+
+
+@pytest.mark.parametrize("arguments", ["--help", "thresholds", "decode 708 b443047a0e80767c", "simulate"])
+def test_a_full_standard_output_is_named(arguments: str) -> None:
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            [*GATEWAY, *arguments.split()], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr == "shadebus: standard output: No space left on device; choose another place for it\n"
+
+
+def test_a_closed_standard_output_is_named() -> None:
+    command = f"{sys.executable} -m gateway run --source serial:/dev/ptmx --for 1 >&-"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "shadebus: standard output is closed: send it to a file, a pipe or /dev/null\n"
+
+
+def test_a_run_that_records_nothing_ends_without_a_word_when_its_reader_leaves() -> None:
+    pipe = f"{sys.executable} -m gateway run --source serial:/dev/ptmx | head -n 1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", pipe], capture_output=True, text=True, timeout=60, check=False)
+    assert done.stdout.endswith("  bridge0: OPENING\n")
+    assert (done.returncode, done.stderr) == (1, "no terrain given: scans and state only, no verdicts\n")
+
+
+def test_nobody_is_told_to_join_the_group_of_root() -> None:
+    mend = permission_mend(Path("/dev/null"))
+    assert mend.startswith(
+        """echo 'KERNEL=="null[0-9]*", GROUP="dialout", MODE="0660"' | sudo tee /etc/udev/rules.d/"""
+    )
+    assert "-aG root" not in mend
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives a file to a group that it is not in")
+def test_another_group_is_to_be_joined(tmp_path: Path) -> None:
+    os.chown(file(tmp_path, b""), -1, grp.getgrnam("tty").gr_gid)
+    assert permission_mend(tmp_path / "file") == "sudo usermod -aG tty $USER, then log in again"
 
 
 def test_a_directory_without_permission_is_named(tmp_path: Path) -> None:

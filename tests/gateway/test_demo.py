@@ -3,6 +3,7 @@
 import html
 import json
 import re
+import signal
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import StringIO
@@ -11,7 +12,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from gateway import demo
+from gateway import demo, stopping
 from gateway.errors import GatewayError
 from gateway.recording import Recording
 from gateway.report import HEADINGS, VERSIONS
@@ -43,7 +44,8 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Shown:
         patch.setattr(demo, "LEG_S", 3 * demo.SWEEP_S)
         patch.setattr(demo, "GNSS_FAILS_S", 6.0)
         patch.setattr(demo, "Console", lambda: Console(file=printed, width=200))
-        demo.fly(out, seed=7, speed=10.0)
+        patch.setattr(signal, "signal", lambda *_: None)  # Ctrl-C is for pytest
+        demo.fly(out, seed=7, speed=10.0, stop=stopping.Stop())
     page = (out / "report" / "index.html").read_text()
     return Shown(printed.getvalue(), page, sorted(out.glob("*/*.mcap")))
 
@@ -104,6 +106,7 @@ def test_the_kernels_are_compiled_before_the_first_gateway_listens(
 
     monkeypatch.setattr(demo, "warm_up", lambda _: happened.append("warm"))
     monkeypatch.setattr(demo, "_live", live)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
     with pytest.raises(GatewayError, match="enough"):
-        demo.fly(tmp_path, seed=7, speed=10.0)
+        demo.fly(tmp_path, seed=7, speed=10.0, stop=stopping.Stop())
     assert happened == ["warm", "live"]

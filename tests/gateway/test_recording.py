@@ -123,7 +123,7 @@ def test_a_changed_byte_in_a_raw_chunk_costs_that_record_and_is_counted(closed: 
     [
         (lambda path: None, "cannot read recording .*: No such file"),
         (lambda path: path.mkdir(), "cannot read recording .*: Is a directory"),
-        (lambda path: path.write_bytes(b""), "is not a shadebus recording: it is too short"),
+        (lambda path: path.write_bytes(b""), "is not a shadebus recording: it ends before its first record"),
         (lambda path: path.write_text("hello, this is text\n" * 50), "is not a shadebus recording"),
         (lambda path: path.write_bytes(bytes(1000)), "is not a shadebus recording"),
     ],

@@ -11,7 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway import supervision
+from gateway.adapters import make_adapter
+from gateway.config import AdapterConfig
 from gateway.supervision import Supervisor
+from simulators.outlets import PtyOutlet
 from tests.gateway.live import wait_until
 
 ERRORS = (
@@ -177,6 +180,42 @@ def test_waits_between_attempts_grow_to_the_longest_and_no_further(monkeypatch: 
     monkeypatch.setattr(supervisor._stopping, "wait", wait)
     supervisor.run()
     assert waits == [0.5, 1.0, 2.0, 4.0, 5.0, 5.0]
+
+
+def test_a_line_stays_lost_for_its_first_reason_and_the_attempts_are_counted() -> None:
+    hung_up, gone = OSError("hung up"), OSError("gone")
+    script: list[tuple[str, Exception | bytes]] = [
+        ("read", hung_up),
+        ("open", gone),
+        ("open", hung_up),
+        ("read", b"words"),
+        ("read", gone),
+        ("read", b"x"),
+    ]
+    seen = supervise(Fake(script), lambda seen: seen.data == b"wordsx")
+    assert [reason for state, reason in seen.states if state == "LOST"] == [
+        "OSError: hung up",
+        "OSError: hung up (attempt 1 to open it again failed: OSError: gone)",
+        "OSError: hung up (attempt 2 to open it again failed)",
+        "OSError: gone",
+    ]
+
+
+def test_a_real_line_that_hangs_up_is_lost_for_that_reason() -> None:
+    seen = Seen()
+    with PtyOutlet() as line:
+        adapter = make_adapter(AdapterConfig(name="bridge", source=line.place))
+        supervisor = Supervisor("bridge", adapter, seen.deliver, seen.report)
+        thread = threading.Thread(target=supervisor.run)
+        thread.start()
+        wait_until(lambda: ("UP", "") in seen.states, "UP")
+    try:
+        wait_until(lambda: [state for state, _ in seen.states].count("LOST") >= 3, "two attempts in vain")
+    finally:
+        supervisor.stop()
+        thread.join(10)
+    first, _, third, *_ = [reason for state, reason in seen.states if state == "LOST"]
+    assert third.startswith(f"{first} (attempt 2 to open it again failed: serial line {line.path}: no such device")
 
 
 def test_the_first_error_is_told_to_who_waits_for_it_and_later_ones_are_not() -> None:
