@@ -152,8 +152,8 @@ def test_a_bad_crc_is_counted() -> None:
 
 
 def test_a_packet_too_short_for_header_and_crc_is_counted_as_a_bad_crc() -> None:
-    short = bytes(15)
-    for packet in (b"", b"\1", short + zlib.crc32(short).to_bytes(4, "little")):
+    short = [head + zlib.crc32(head).to_bytes(4, "little") for head in (b"", bytes(15), b"\1", b"\1" + bytes(14))]
+    for packet in (b"", b"\1", *short):
         assert fed([frame(packet)])[1]["bad_crc"] == 1
 
 
