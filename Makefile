@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test lint bench integrity sensitivity latency calibration setup lock clean
+.PHONY: demo test lint bench integrity sensitivity latency load calibration setup lock clean
 
 demo: $(READY)
 	$(BIN)/shadebus demo
@@ -30,6 +30,10 @@ sensitivity: $(READY)
 # Time from a full scan on the line to its verdict, at real bus rates.
 latency: $(READY)
 	$(BIN)/python -m benchmarks.latency
+
+# What share of one core a rack at live rates takes.
+load: $(READY)
+	$(BIN)/python -m benchmarks.load
 
 # The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
 calibration: $(READY)

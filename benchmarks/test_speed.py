@@ -45,15 +45,25 @@ def test_framer(benchmark: BenchmarkFixture, stream: bytes) -> None:
 
 
 @pytest.mark.benchmark(group="framing, 2000 packets")
-def test_bare_loop_over_cobs_and_crc(benchmark: BenchmarkFixture, stream: bytes) -> None:
-    def loop() -> int:
-        good = 0
-        for run in stream.split(b"\0")[:-1]:
-            packet = cobs.decode(run)
-            good += zlib.crc32(packet[:-4]) == int.from_bytes(packet[-4:], "little")
-        return good
+def test_framing_by_a_bare_loop_over_cobs_and_crc(benchmark: BenchmarkFixture, stream: bytes) -> None:
+    assert benchmark(lambda: _bare_loop([stream])) == PACKETS
 
-    assert benchmark(loop) == PACKETS
+
+@pytest.mark.benchmark(group="framing, 2000 packets in pieces of 4 KiB")
+def test_framer_on_a_serial_line(benchmark: BenchmarkFixture, stream: bytes) -> None:
+    pieces = _pieces(stream)
+
+    def frame_all() -> int:
+        framer = Framer()
+        return sum(len(framer.feed(piece)) for piece in pieces)
+
+    assert benchmark(frame_all) == PACKETS
+
+
+@pytest.mark.benchmark(group="framing, 2000 packets in pieces of 4 KiB")
+def test_framing_by_a_bare_loop_on_a_serial_line(benchmark: BenchmarkFixture, stream: bytes) -> None:
+    pieces = _pieces(stream)
+    assert benchmark(lambda: _bare_loop(pieces)) == PACKETS
 
 
 @pytest.mark.benchmark(group="708 words to bins, 10000 words")
@@ -115,6 +125,20 @@ def test_radar_thread(benchmark: BenchmarkFixture) -> None:
 def test_copy_of_the_bins(benchmark: BenchmarkFixture) -> None:
     bins = RNG.integers(0, 5, (RADIALS, BINS), np.uint8)
     assert benchmark(bins.copy).shape == bins.shape
+
+
+def _pieces(stream: bytes) -> list[bytes]:
+    return [stream[at : at + 4096] for at in range(0, len(stream), 4096)]
+
+
+def _bare_loop(pieces: list[bytes]) -> int:
+    good, rest = 0, b""
+    for piece in pieces:
+        *runs, rest = (rest + piece).split(b"\0")
+        for run in runs:
+            packet = cobs.decode(run)
+            good += zlib.crc32(packet[:-4]) == int.from_bytes(packet[-4:], "little")
+    return good
 
 
 @njit(cache=True)

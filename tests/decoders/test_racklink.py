@@ -2,7 +2,9 @@
 
 import struct
 import sys
+import tracemalloc
 import zlib
+from functools import cache
 from itertools import pairwise
 from subprocess import run
 
@@ -13,6 +15,7 @@ from hypothesis import strategies as st
 
 from decoders import layouts
 from decoders.racklink import (
+    MOST_STARTS,
     ChannelCount,
     Framer,
     Hello,
@@ -46,6 +49,7 @@ def made(kind: int, body: bytes, time_ns: int = 1000) -> Packet:
 
 GOOD = Packet(0x10, 7, 0x12, 3, 2**40 + 5, b"body")
 GOOD_FRAME = frame(packet_bytes(b"body", sequence=3))
+FALSE_START = b"\5\1abc"  # sound COBS that begins as a packet does: what a hostile sender would repeat
 
 
 def fed(pieces: list[bytes]) -> tuple[list[Packet], dict[str, int]]:
@@ -74,6 +78,32 @@ def test_any_cut_of_the_stream_gives_the_same_packets_and_counters(
     stream = b"".join([frame(packet_bytes(body)) for body in bodies] + garbage + [GOOD_FRAME] + garbage)
     cuts = [0, *sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=12))), len(stream)]
     assert fed([stream[a:b] for a, b in pairwise(cuts)]) == fed([stream])
+
+
+@pytest.mark.parametrize("size", [*range(1, len(GOOD_FRAME) + 2), 100, 1000, 4096, LARGEST_RUN, LARGEST_RUN + 1])
+def test_after_each_piece_of_any_size_the_outcome_is_that_of_the_bytes_so_far_at_once(size: int) -> None:
+    stream, at_once = every_outcome()
+    framer, packets = Framer(), 0
+    for end in range(size, len(stream) + size, size):
+        packets += len(framer.feed(stream[end - size : end]))
+        assert (packets, framer.counters()) == at_once[min(end, len(stream))]
+
+
+@cache
+def every_outcome() -> tuple[bytes, list[tuple[int, dict[str, int]]]]:
+    """A stream that meets every fault and every way out of one, and what each beginning of it gives."""
+    damaged = GOOD_FRAME[:-3] + b"\xff" + GOOD_FRAME[-2:]
+    parts = [GOOD_FRAME, b"\0\0", damaged, b"\xffab" + GOOD_FRAME, b"\x09abc\0", frame(packet_bytes(b"new", version=2))]
+    parts += [frame(packet_bytes(bytes(4077))), b"\7" * 4200 + GOOD_FRAME, frame(b"short"), GOOD_FRAME, GOOD_FRAME[:9]]
+    stream = b"".join(parts)
+    outcomes = [fed([stream[:end]]) for end in range(len(stream) + 1)]
+    return stream, [(len(packets), counters) for packets, counters in outcomes]
+
+
+def test_the_stream_of_every_outcome_meets_every_counter() -> None:
+    packets, counters = every_outcome()[1][-1]
+    assert packets == 4
+    assert all(counters.values())
 
 
 @given(st.lists(BODIES, max_size=2), GARBAGE)
@@ -122,8 +152,8 @@ def test_a_bad_crc_is_counted() -> None:
 
 
 def test_a_packet_too_short_for_header_and_crc_is_counted_as_a_bad_crc() -> None:
-    short = bytes(15)
-    for packet in (b"", b"\1", short + zlib.crc32(short).to_bytes(4, "little")):
+    short = [head + zlib.crc32(head).to_bytes(4, "little") for head in (b"", bytes(15), b"\1", b"\1" + bytes(14))]
+    for packet in (b"", b"\1", *short):
         assert fed([frame(packet)])[1]["bad_crc"] == 1
 
 
@@ -153,6 +183,47 @@ def test_an_overlong_run_is_one_count_and_costs_no_good_packet() -> None:
     packets, counters = fed([b"\7" * 5000, b"\7" * 5000, GOOD_FRAME, GOOD_FRAME])
     assert (packets, counters["oversize"]) == ([GOOD, GOOD], 1)
     assert counters["skipped"] == 10_000
+
+
+@pytest.mark.parametrize("piece", [1, 4096, 1 << 20])
+@pytest.mark.parametrize("repeats", [LARGEST_RUN // len(FALSE_START), 10_000])
+def test_a_run_full_of_false_starts_costs_a_bounded_number_of_attempts(
+    monkeypatch: pytest.MonkeyPatch, repeats: int, piece: int
+) -> None:
+    attempts: list[int] = []
+    decode = cobs.decode
+
+    def counted(run: bytes) -> bytes:
+        attempts.append(len(run))
+        return bytes(decode(run))
+
+    monkeypatch.setattr(cobs, "decode", counted)
+    run = FALSE_START * repeats + b"\0"
+    _, counters = fed([run[at : at + piece] for at in range(0, len(run), piece)])
+    assert MOST_STARTS <= len(attempts) <= MOST_STARTS + 2
+    assert sum(size > LARGEST_RUN for size in attempts) <= 1
+    assert (counters["skipped"], counters["bad_crc"] + counters["oversize"]) == (len(run), 1)
+
+
+def test_a_packet_behind_as_many_false_starts_as_are_tried_is_lost_and_costs_no_other() -> None:
+    packets, counters = fed([FALSE_START * MOST_STARTS + GOOD_FRAME])  # a run is not searched at its own start
+    assert (packets, counters["skipped"]) == ([GOOD], len(FALSE_START) * MOST_STARTS)
+    garbage = FALSE_START * (MOST_STARTS + 1) + GOOD_FRAME
+    packets, counters = fed([garbage + GOOD_FRAME])
+    assert (packets, counters["skipped"], counters["bad_crc"]) == ([GOOD], len(garbage), 1)
+
+
+@pytest.mark.parametrize("endless", [b"\7", FALSE_START, b"\xff\1", b"\0"])
+def test_memory_stays_bounded_whatever_comes(endless: bytes) -> None:
+    framer, piece = Framer(), endless * (4096 // len(endless))
+    framer.feed(piece * 2)
+    tracemalloc.start()
+    for _ in range(50):
+        framer.feed(piece)
+    kept, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert kept < 4 * LARGEST_RUN
+    assert peak < 100_000
 
 
 def test_another_version_is_intact_and_counted_but_no_packet() -> None:
