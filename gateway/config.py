@@ -1,5 +1,6 @@
 """The configuration of a rack: one TOML file, checked as a whole before anything opens."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -34,6 +35,16 @@ ProfileName = Annotated[str, AfterValidator(_known_profile)]
 ChannelNumber = Annotated[int, Field(ge=0, le=255)]  # one byte of a packet
 
 
+def _octal(label: str) -> str:
+    if not re.fullmatch("[0-3][0-7]{2}", label):
+        raise ValueError(f"label {label!r} is not three octal digits, 000 to 377")
+    return label
+
+
+OctalLabel = Annotated[str, AfterValidator(_octal)]
+Delay = Annotated[float, Field(ge=0, le=1000)]
+
+
 class ChannelConfig(_Section):
     """What a channel of a bridge carries, where its hello packet does not say so or says too little."""
 
@@ -41,6 +52,12 @@ class ChannelConfig(_Section):
     definitions: DefinitionsName | None = Field(None, description="label set by name, or a TOML file of one")
     orientation: Literal["wire", "label_swapped"] = "wire"
     profile: ProfileName | None = Field(None, description="ARINC 708 profile")
+    join_rule: Literal["concatenate", "toward_zero"] = Field(
+        "concatenate", description="how fine position words join coarse ones in the south and west"
+    )
+    delays_ms: dict[OctalLabel, Delay] = Field(
+        default_factory=dict, description="by octal label, how long after it was true a value is sent"
+    )
 
 
 class AdapterConfig(_Section):

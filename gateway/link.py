@@ -4,8 +4,14 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from decoders import arinc429
 from decoders import formats as f
+from decoders.arinc429 import JoinRule
 from decoders.definitions import Definitions, for_equipment, load_definitions
+from decoders.health429 import EQUIPMENT, BusHealth
 from decoders.racklink import ChannelCount, Framer, Hello, Packet
 from gateway.config import AdapterConfig
 
@@ -22,18 +28,20 @@ SPOILT = f.FLAG_CODING | f.FLAG_WORD_LENGTH | f.FLAG_SYNC  # words whose bits ca
 
 @dataclass(frozen=True)
 class Channel429:
-    """An ARINC 429 channel: the equipment on it and how to read its labels."""
+    """An ARINC 429 channel: how to read its labels, when their values were true, and how well the bus behaves."""
 
-    equipment: int
     definitions: Definitions
-    orientation: str
+    health: BusHealth
+    orientation: str = "wire"
+    join_rule: JoinRule = "concatenate"
+    delays_ns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(256, np.int64))  # by label
 
     packet_type: ClassVar[int] = f.WORDS_429
 
     @property
     def role(self) -> str:
         """What only one channel can be at a time."""
-        return f"source of equipment {self.equipment:02X}"
+        return f"source of equipment {self.definitions.equipment_id & 0xFF:02X}"
 
 
 @dataclass(frozen=True)
@@ -56,6 +64,7 @@ class Link:
     losses: Counter[str] = field(default_factory=Counter)  # since the last verdict
     channels: dict[int, Channel429 | Channel708] = field(default_factory=dict)
     _next_sequence: int | None = None
+    _said: dict[int, int] = field(default_factory=dict)  # by channel, its equipment as its last label 377 said
     _lost: dict[int, int] = field(default_factory=dict)  # by channel, as the last heartbeat said
 
     def __post_init__(self) -> None:
@@ -63,8 +72,7 @@ class Link:
             if channel.kind == "arinc708":
                 self.channels[number] = Channel708(channel.profile or self.radar_profile)
             elif channel.definitions:
-                definitions = load_definitions(channel.definitions)
-                self.channels[number] = Channel429(definitions.equipment_id & 0xFF, definitions, channel.orientation)
+                self._take(number, channel.definitions, channel.orientation, f.KIND_429_HIGH)
 
     def succeed(self, before: "Link") -> None:
         """Take over the channels and counters of a link whose pipeline failed; bytes half framed are lost with it."""
@@ -85,9 +93,39 @@ class Link:
                     self.counters["channels_of_unknown_equipment"] += 1
                 else:
                     orientation = configured.orientation if configured else f.ORIENTATIONS[said.orientation]
-                    self.channels[said.channel] = Channel429(said.equipment_id, load_definitions(name), orientation)
+                    self._take(said.channel, name, orientation, said.kind)
             else:
                 self.counters["channels_of_unknown_kind"] += 1
+
+    def identify(self, number: int, words: NDArray[np.uint32]) -> str | None:
+        """Take a channel that nobody announced by its own equipment label (377); return the set it is read by now.
+
+        Label 377 is the same in both orientations. Two normal words must say the same before they are believed.
+        """
+        parts = arinc429.unpack(words)
+        said = parts.data[(parts.label == EQUIPMENT) & parts.parity_ok & (parts.ssm == 0)] & 0xFFF
+        for equipment in said.tolist():
+            name = for_equipment(equipment & 0xFF)
+            if name and self._said.get(number) == equipment:
+                configured = self.config.channels.get(number)
+                self._take(number, name, configured.orientation if configured else "wire", f.KIND_429_HIGH)
+                return name
+            self._said[number] = equipment
+        return None
+
+    def _take(self, number: int, definitions_name: str, orientation: str, kind: int) -> None:
+        definitions = load_definitions(definitions_name)
+        configured = self.config.channels.get(number)
+        delays_ns = np.zeros(256, np.int64)
+        for label, delay_ms in configured.delays_ms.items() if configured else ():
+            delays_ns[int(label, 8)] = round(delay_ms * 1e6)
+        self.channels[number] = Channel429(
+            definitions,
+            BusHealth(definitions, orientation, kind),
+            orientation,
+            configured.join_rule if configured else "concatenate",
+            delays_ns,
+        )
 
     def count(self, packet: Packet) -> None:
         """Count the packet, the flags it carries, and the packets missing before it."""
@@ -126,4 +164,9 @@ class Link:
 
     def all_counters(self) -> dict[str, int]:
         """Every counter of this bridge by name."""
-        return {**self.framer.counters(), **self.counters}
+        peaks = {
+            f"channel_{number}.peak_words_per_s": round(channel.health.peak_words_per_s)
+            for number, channel in self.channels.items()
+            if isinstance(channel, Channel429)
+        }
+        return {**self.framer.counters(), **self.counters, **peaks}

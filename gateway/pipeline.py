@@ -11,6 +11,7 @@ import numpy as np
 
 from decoders import arinc429, arinc708
 from decoders import formats as f
+from decoders.health429 import Finding
 from decoders.racklink import MalformedBody, Packet, heartbeat, hello, radar_word, words429
 from gateway.config import RackConfig
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
@@ -47,7 +48,7 @@ class Pipeline:
         self._watcher = watcher
         self._links = {a.name: Link(a, config.radar_profile) for a in config.adapters}
         self._timebase = Timebase()
-        self._aircraft = Aircraft()
+        self._aircraft = Aircraft(config.monitor.height_source)
         self._scans = ScanBuilder()
         self._counters: Counter[str] = Counter()
         self._now_ns = 0  # common time of the latest word
@@ -57,6 +58,7 @@ class Pipeline:
         self._quiet: set[str] = set()
         self._users: dict[str, tuple[tuple[str, int], int]] = {}  # by role: adapter and channel, and when last heard
         self._unused: dict[tuple[str, int], str] = {}  # why a channel is not used, told already
+        self._doubted: set[str] = set()  # quantities whose coarse and fine words seem to be joined by the wrong rule
         self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
         self._last: Record | None = None
         if before:
@@ -115,7 +117,9 @@ class Pipeline:
         self._heard[source] = record.stamp.monotonic_ns
         if source in self._quiet:
             self._quiet.discard(source)
-            yield StatusEvent(record.stamp.utc_ns, record.sequence, source, "HEARD", f"{_things(source)} come again")
+            yield StatusEvent(
+                record.stamp.utc_ns, record.sequence, source, "HEARD", f"{self._things(source)} come again"
+            )
 
     def _packet(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         if packet.time_ns > LATEST_DEVICE_NS:
@@ -138,6 +142,14 @@ class Pipeline:
         """
         here, now_ns = (record.adapter, packet.channel), record.stamp.monotonic_ns
         channel = link.channels.get(packet.channel)
+        if (
+            channel is None
+            and packet.type == f.WORDS_429
+            and (name := link.identify(packet.channel, words429(packet).words))
+        ):
+            reason = f"label 377 says what channel {packet.channel} is: read as {name} from now on"
+            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "IDENTIFIED", reason)
+            return False
         if channel is None:
             why = "until a hello or [adapters.channels] says what it carries"
         elif packet.type != channel.packet_type or packet.flags & SPOILT:
@@ -161,7 +173,7 @@ class Pipeline:
         if self._timebase.restarts > restarts:
             for scan in self._scans.finish():
                 yield from self._judge(scan, record)
-            self._aircraft = Aircraft()
+            self._aircraft = Aircraft(self._config.monitor.height_source)
             reason = f"the bridge's clock began anew at {packet.time_ns / 1e9:.3f} s; the state before it is dropped"
             self._troubles[f"clock of {record.adapter}"] = f"degraded: {record.adapter}: {reason}"
             yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "CLOCK_RESTARTED", reason)
@@ -184,7 +196,16 @@ class Pipeline:
             if status and count:
                 link.counters[f"words_429_{arinc429.Status(status).name.lower()}"] += count
         offset_ns = yield from self._offset_ns(packet, record)
-        self._aircraft.feed(channel.equipment, block.time_ns + offset_ns, block.words, values)
+        yield from self._hear(f"{record.adapter}/{packet.channel}", record)
+        for finding in channel.health.feed(block.time_ns, values):
+            yield self._finding(f"{record.adapter}/{packet.channel}", finding, record)
+        true_ns = block.time_ns + offset_ns - channel.delays_ns[values.label]
+        self._aircraft.feed(channel.definitions, true_ns, block.words, values, channel.join_rule)
+
+    def _finding(self, about: str, finding: Finding, record: Raw) -> StatusEvent:
+        state = "BUS_WRONG" if finding.wrong else "BUS_RIGHT"
+        self._counters[f"{about}.{state.lower()}"] += 1
+        return StatusEvent(record.stamp.utc_ns, record.sequence, about, state, finding.reason)
 
     def _radar(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         word = radar_word(packet)
@@ -242,17 +263,26 @@ class Pipeline:
                 if source == RADAR and self._monitor:
                     silence = self._monitor.unavailable(self._scans.skip(), [f"radar: {reason}"])
                     yield self._verdict(silence, self._monitor, record)
+        for quantity, doubt in self._aircraft.join_doubts().items():
+            if quantity not in self._doubted:
+                self._doubted.add(quantity)
+                self._troubles[quantity] = f"degraded: {quantity}: {doubt}"
+                yield StatusEvent(*stamp, quantity, "JOIN_RULE", doubt)
         yield self._state(record)
 
     def _quiet_reason(self, source: str, silent_ns: int, record: Tick) -> str:
-        silent = f"no {_things(source)} for {silent_ns / 1e9:.1f} s"
+        silent = f"no {self._things(source)} for {silent_ns / 1e9:.1f} s"
         bytes_ns = self._chunk.get(source)
         if bytes_ns is None or record.stamp.monotonic_ns - bytes_ns > QUIET_NS:
             return silent
         return f"{silent}, though bytes come: check the baud rate and that the bridge speaks RackLink"
 
+    def _things(self, source: str) -> str:
+        return "packets" if source in self._links else "words"
+
     def _state(self, record: Tick) -> StateEvent:
-        silent_ns = record.stamp.monotonic_ns - (self._now_host_ns or record.stamp.monotonic_ns)
+        heard_ns = self._now_host_ns
+        silent_ns = 0 if heard_ns is None else record.stamp.monotonic_ns - heard_ns
         now_ns = self._now_ns + silent_ns  # without words the state must still grow old
         values: dict[str, float | None] = {}
         validity: dict[str, str] = {}
@@ -264,8 +294,7 @@ class Pipeline:
             validity[name] = status_name(status)
             newest = track.newest
             age_s[name] = (now_ns - newest[0]) / 1e9 if newest else None
+        utc = self._aircraft.utc.at(now_ns)
+        values["utc_s"] = utc and utc.utc_ns / 1e9
+        validity["utc_s"] = "MISSING" if utc is None else "NORMAL" if utc.precise else "NOT_PRECISE"
         return StateEvent(record.stamp.utc_ns, record.sequence, values, validity, age_s)
-
-
-def _things(source: str) -> str:
-    return "words" if source == RADAR else "packets"

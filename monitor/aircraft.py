@@ -1,70 +1,136 @@
 """The aircraft's state from decoded ARINC 429 words: which label of which equipment gives which quantity, and when.
 
 Position comes from the GNSS, whose coarse and fine words are joined only within one navigation epoch. Nothing stands in
-for it silently: an inertial position steps by 19 m and drifts, so it is kept beside, never instead.
+for it silently: an inertial position steps by 19 m and drifts, so it is kept beside, never instead. Two sources of one
+quantity are never mixed either: the first is used until it falls silent.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from decoders.arinc429 import Status, Values429, join_position
-from monitor.geodesy import FT_M, KT_M_S
+from decoders import arinc429
+from decoders.arinc429 import JoinRule, Status, Values429
+from decoders.definitions import Definitions
+from monitor import geoid
+from monitor.geodesy import FT_M, KT_M_S, NM_M
+from monitor.join_check import JoinCheck
+from monitor.settings import HeightSource
 from monitor.track import MISSING, NORMAL, STALE, Quantity, Track
+from monitor.utc import UTC_LABELS, UtcClock
 
 EPOCH_NS = 40_000_000  # a set is sent in one burst, at low speed in 35 ms; the next comes 100 ms later or more
+G_M_S2: Final = 9.80665
+SI: Final = {
+    "": 1.0, "deg": 1.0, "deg/s": 1.0, "m": 1.0, "ft": FT_M, "NM": NM_M, "kt": KT_M_S, "ft/min": FT_M / 60, "g": G_M_S2,
+}  # fmt: skip # degrees stay degrees
 
 LATITUDE = Quantity("latitude_deg", 2.5, angle=True)
 LONGITUDE = Quantity("longitude_deg", 2.5, angle=True)
 HEIGHT = Quantity("height_m", 2.5)
+ELLIPSOID_HEIGHT = Quantity("ellipsoid_height_m", 2.5)
+GNSS_MODE = Quantity("gnss_mode", 2.5, step=True)
+SATELLITE_FAILURE = Quantity("gnss_satellite_failure", 2.5, step=True)
+INTEGRITY_LIMIT = Quantity("horizontal_integrity_limit_m", 2.5, step=True)
+HORIZONTAL_MERIT = Quantity("horizontal_figure_of_merit_m", 2.5, step=True)
+VERTICAL_MERIT = Quantity("vertical_figure_of_merit_m", 2.5, step=True)
+GNSS_SPEED = Quantity("gnss_ground_speed_m_s", 2.5)
+GNSS_TRACK = Quantity("gnss_track_deg", 2.5, angle=True)
+GNSS_NORTH = Quantity("gnss_north_velocity_m_s", 2.5)
+GNSS_EAST = Quantity("gnss_east_velocity_m_s", 2.5)
+GNSS_UP = Quantity("gnss_up_velocity_m_s", 2.5)
 PITCH = Quantity("pitch_deg", 0.25, angle=True)
 ROLL = Quantity("roll_deg", 0.25, angle=True)
 HEADING = Quantity("heading_deg", 0.25, angle=True)
+MAGNETIC_HEADING = Quantity("magnetic_heading_deg", 0.25, angle=True)
+DRIFT = Quantity("drift_deg", 0.5, angle=True)
 GROUND_SPEED = Quantity("ground_speed_m_s", 0.5)
 TRACK_ANGLE = Quantity("track_deg", 0.5, angle=True)
+NORTH = Quantity("north_velocity_m_s", 0.5)
+EAST = Quantity("east_velocity_m_s", 0.5)
+UP = Quantity("up_velocity_m_s", 0.5)
 INERTIAL_LATITUDE = Quantity("inertial_latitude_deg", 1.0, angle=True)
 INERTIAL_LONGITUDE = Quantity("inertial_longitude_deg", 1.0, angle=True)
 INERTIAL_HEIGHT = Quantity("inertial_height_m", 0.5)
+HYBRID_LATITUDE = Quantity("hybrid_latitude_deg", 1.0, angle=True)
+HYBRID_LONGITUDE = Quantity("hybrid_longitude_deg", 1.0, angle=True)
+HYBRID_HEIGHT = Quantity("hybrid_height_m", 0.5)
+PRESSURE_ALTITUDE = Quantity("pressure_altitude_m", 0.5)
+BARO_ALTITUDE = Quantity("baro_altitude_m", 0.5)
+TRUE_AIRSPEED = Quantity("true_airspeed_m_s", 0.5)
 RADIO_HEIGHT = Quantity("radio_height_m", 0.5)
-INTEGRITY_LIMIT = Quantity("horizontal_integrity_limit_nm", 2.5)
+
+GNSS, INERTIAL, HYBRID, AIR_DATA, RADIO = (0x0B,), (0x04, 0x05, 0x38), (0x38,), (0x06,), (0x07,)  # low byte of the id
 
 
 class Source(NamedTuple):
-    """A label of an equipment (its low byte) that gives a quantity, times a factor to the quantity's unit."""
+    """A label of some equipment that gives a quantity, as its value or as discrete bits of it."""
 
-    equipment: int
+    equipment: tuple[int, ...]
     label: int
     quantity: Quantity
-    factor: float = 1.0
+    bits: str = ""
 
 
 SOURCES = (
-    Source(0x0B, 0o076, HEIGHT, FT_M),
-    Source(0x0B, 0o130, INTEGRITY_LIMIT),
-    Source(0x04, 0o310, INERTIAL_LATITUDE),
-    Source(0x04, 0o311, INERTIAL_LONGITUDE),
-    Source(0x04, 0o312, GROUND_SPEED, KT_M_S),
-    Source(0x04, 0o313, TRACK_ANGLE),
-    Source(0x04, 0o314, HEADING),
-    Source(0x04, 0o324, PITCH),
-    Source(0x04, 0o325, ROLL),
-    Source(0x04, 0o361, INERTIAL_HEIGHT, FT_M),
-    Source(0x07, 0o164, RADIO_HEIGHT, FT_M),
+    Source(GNSS, 0o076, HEIGHT),
+    Source(GNSS, 0o370, ELLIPSOID_HEIGHT),
+    Source(GNSS, 0o103, GNSS_TRACK),
+    Source(GNSS, 0o112, GNSS_SPEED),
+    Source(GNSS, 0o130, INTEGRITY_LIMIT),
+    Source(GNSS, 0o130, SATELLITE_FAILURE, "satellite_failure"),
+    Source(GNSS, 0o136, VERTICAL_MERIT),
+    Source(GNSS, 0o165, GNSS_UP),
+    Source(GNSS, 0o166, GNSS_NORTH),
+    Source(GNSS, 0o174, GNSS_EAST),
+    Source(GNSS, 0o247, HORIZONTAL_MERIT),
+    Source(GNSS, 0o273, GNSS_MODE, "mode"),
+    Source(INERTIAL, 0o310, INERTIAL_LATITUDE),
+    Source(INERTIAL, 0o311, INERTIAL_LONGITUDE),
+    Source(INERTIAL, 0o312, GROUND_SPEED),
+    Source(INERTIAL, 0o313, TRACK_ANGLE),
+    Source(INERTIAL, 0o314, HEADING),
+    Source(INERTIAL, 0o320, MAGNETIC_HEADING),
+    Source(INERTIAL, 0o321, DRIFT),
+    Source(INERTIAL, 0o324, PITCH),
+    Source(INERTIAL, 0o325, ROLL),
+    Source(INERTIAL, 0o361, INERTIAL_HEIGHT),
+    Source(INERTIAL, 0o365, UP),
+    Source(INERTIAL, 0o366, NORTH),
+    Source(INERTIAL, 0o367, EAST),
+    Source(HYBRID, 0o261, HYBRID_HEIGHT),
+    Source(AIR_DATA, 0o203, PRESSURE_ALTITUDE),
+    Source(AIR_DATA, 0o204, BARO_ALTITUDE),
+    Source(AIR_DATA, 0o210, TRUE_AIRSPEED),
+    Source(RADIO, 0o164, RADIO_HEIGHT),
 )
 
 
 class Axis(NamedTuple):
-    """The coarse and fine labels of one coordinate of the GNSS."""
+    """The coarse and fine labels of one coordinate."""
 
-    equipment: int
+    equipment: tuple[int, ...]
     coarse: int
     fine: int
     quantity: Quantity
 
 
-AXES = (Axis(0x0B, 0o110, 0o120, LATITUDE), Axis(0x0B, 0o111, 0o121, LONGITUDE))
+AXES = (
+    Axis(GNSS, 0o110, 0o120, LATITUDE),
+    Axis(GNSS, 0o111, 0o121, LONGITUDE),
+    Axis(HYBRID, 0o254, 0o256, HYBRID_LATITUDE),
+    Axis(HYBRID, 0o255, 0o257, HYBRID_LONGITUDE),
+)
+SOURCES_OF: Final = {
+    (equipment, source.label): [row for row in SOURCES if equipment in row.equipment and row.label == source.label]
+    for source in SOURCES
+    for equipment in source.equipment
+}
+AXIS_OF: Final = {(equipment, label): axis for axis in AXES for equipment in axis.equipment for label in axis[1:3]}
+QUANTITIES = tuple({row.quantity.name: row.quantity for row in (*SOURCES, *AXES)}.values())
 
 
 @dataclass
@@ -84,39 +150,102 @@ def status_name(status: int) -> str:
 
 @dataclass
 class Aircraft:
-    """Tracks of every quantity, fed with decoded blocks."""
+    """Tracks of every quantity, fed with decoded blocks; heights are above mean sea level, metres.
 
-    tracks: dict[str, Track] = field(
-        default_factory=lambda: {q.name: Track(q) for q in [s.quantity for s in SOURCES] + [a.quantity for a in AXES]}
-    )
+    `height_source` "370" makes the height from the GNSS height above the ellipsoid and the EGM96 geoid.
+    """
+
+    height_source: HeightSource = "076"
+    tracks: dict[str, Track] = field(default_factory=lambda: {q.name: Track(q) for q in QUANTITIES})
+    utc: UtcClock = field(default_factory=UtcClock)
+    _owners: dict[str, int] = field(default_factory=dict)
     _halves: dict[str, _Half] = field(default_factory=dict)
+    _joins: Mapping[str, JoinCheck] = field(default_factory=lambda: {axis.quantity.name: JoinCheck() for axis in AXES})
 
-    def feed(self, equipment: int, time_ns: NDArray[np.int64], words: NDArray[np.uint32], values: Values429) -> None:
-        """Take one decoded block of a channel (n,); `words` are in wire orientation."""
-        for source in SOURCES:
-            if source.equipment == equipment:
-                at = values.label == source.label
-                if at.any():
-                    track = self.tracks[source.quantity.name]
-                    track.append(time_ns[at], values.value[at] * source.factor, values.status[at])
-        for axis in AXES:
-            if axis.equipment == equipment:
-                at = (values.label == axis.coarse) | (values.label == axis.fine)
-                for k in np.flatnonzero(at):
-                    coarse = bool(values.label[k] == axis.coarse)
-                    self._join(axis, _Half(int(time_ns[k]), int(words[k]), int(values.status[k]), coarse))
+    def feed(
+        self,
+        definitions: Definitions,
+        time_ns: NDArray[np.int64],
+        words: NDArray[np.uint32],
+        values: Values429,
+        join_rule: JoinRule = "concatenate",
+    ) -> None:
+        """Take one decoded block of a channel (n,): raw words, their values, and when each was true (i8, ns)."""
+        equipment = definitions.equipment_id & 0xFF
+        labels = values.label.tolist()
+        for label in dict.fromkeys(labels):
+            for source in SOURCES_OF.get((equipment, label), ()):
+                at = values.label == label
+                self._take(source, definitions, time_ns[at], words[at], values.value[at], values.status[at])
+        for k, label in enumerate(labels):
+            if axis := AXIS_OF.get((equipment, label)):
+                half = _Half(int(time_ns[k]), int(words[k]), int(values.status[k]), label == axis.coarse)
+                self._join(axis, equipment, half, join_rule)
+            elif label in UTC_LABELS and equipment in GNSS:
+                self.utc.feed(int(time_ns[k]), int(words[k]), values, k, definitions)
 
-    def _join(self, axis: Axis, half: _Half) -> None:
+    def join_doubts(self) -> dict[str, str]:
+        """By quantity, why the rule that joins its coarse and fine words seems to be the wrong one."""
+        return {name: doubt for name, check in self._joins.items() if (doubt := check.doubt())}
+
+    def _take(
+        self,
+        source: Source,
+        definitions: Definitions,
+        time_ns: NDArray[np.int64],
+        words: NDArray[np.uint32],
+        value: NDArray[np.float64],
+        status: NDArray[np.uint8],
+    ) -> None:
+        definition = definitions.labels.get(source.label)
+        if definition is None or (source.bits and source.bits not in definition.fields):
+            return
+        if source.bits:
+            given = arinc429.field(words, definition, source.bits).astype(np.float64)
+        else:
+            given = value * SI[definition.units]
+        equipment = definitions.equipment_id & 0xFF
+        if source.quantity is not HEIGHT or self.height_source == "076":
+            self._append(source.quantity, equipment, time_ns, given, status)
+        if source.quantity is ELLIPSOID_HEIGHT and self.height_source == "370":
+            undulation, known = self._undulation_m()
+            self._append(HEIGHT, equipment, time_ns, given - undulation, np.maximum(status, known))
+
+    def _undulation_m(self) -> tuple[float, int]:
+        """Geoid over ellipsoid at the newest position, and the status of that position."""
+        newest = [self.tracks[quantity.name].newest for quantity in (LATITUDE, LONGITUDE)]
+        if newest[0] is None or newest[1] is None:
+            return 0.0, int(Status.NO_COMPUTED_DATA)
+        (_, latitude, one), (_, longitude, other) = newest[0], newest[1]
+        return geoid.undulation_m(latitude, longitude), max(one, other)
+
+    def _append(
+        self,
+        quantity: Quantity,
+        equipment: int,
+        time_ns: NDArray[np.int64],
+        value: NDArray[np.float64],
+        status: NDArray[np.uint8],
+    ) -> None:
+        track, owner = self.tracks[quantity.name], self._owners.get(quantity.name, equipment)
+        if owner != equipment:
+            newest = track.newest
+            if newest and time_ns[0] - newest[0] <= 2e9 * quantity.longest_gap_s:
+                return
+            self.tracks[quantity.name] = track = Track(quantity)
+        self._owners[quantity.name] = equipment
+        track.append(time_ns, value, status)
+
+    def _join(self, axis: Axis, equipment: int, half: _Half, rule: JoinRule) -> None:
         other = self._halves.pop(axis.quantity.name, None)
         if other is None or other.coarse == half.coarse or abs(half.time_ns - other.time_ns) > EPOCH_NS:
             self._halves[axis.quantity.name] = half
             return
         coarse, fine = (half, other) if half.coarse else (other, half)
         status = max(coarse.status, fine.status)
-        degrees = 0.0
+        degrees = np.zeros(1)
         if status == NORMAL:
-            joined = join_position(np.array([coarse.word], np.uint32), np.array([fine.word], np.uint32))
-            degrees = float(joined[0])
-        self.tracks[axis.quantity.name].append(
-            np.array([coarse.time_ns]), np.array([degrees]), np.array([status], np.uint8)
-        )
+            words = np.array([coarse.word], np.uint32), np.array([fine.word], np.uint32)
+            degrees = arinc429.join_position(*words, rule)
+            self._joins[axis.quantity.name].feed(*words, rule)
+        self._append(axis.quantity, equipment, np.array([coarse.time_ns]), degrees, np.array([status], np.uint8))

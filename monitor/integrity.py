@@ -19,6 +19,7 @@ from monitor.disparity import (
     statistic,
     threshold,
 )
+from monitor.gate import position_doubts
 from monitor.geodesy import HIGHEST_LATITUDE_DEG, LONGEST_RANGE_NM, NM_M, body_to_enu, displace
 from monitor.prediction import Beam, Pointing, predict
 from monitor.scans import Scan
@@ -117,6 +118,10 @@ class Monitor:
             for quantity, row in zip(NEEDED, status, strict=True)
             if row.any()
         ]
+        if self.settings.position_gate:
+            doubtful, doubts = position_doubts(aircraft, times)
+            usable &= ~doubtful
+            reasons += doubts
         polar = usable & (np.abs(found[0].value) > HIGHEST_LATITUDE_DEG)
         if polar.any():
             usable &= ~polar

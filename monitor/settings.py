@@ -4,6 +4,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+HeightSource = Literal["076", "370"]
+
 
 class LeverArm(BaseModel):
     """From the GNSS antenna to the radar antenna in the aircraft's body, metres."""
@@ -41,6 +43,12 @@ class MonitorSettings(BaseModel):
         None, gt=0, description="ignore everything beyond; the range setting if not set"
     )
     lever_arm: LeverArm = LeverArm()
+    height_source: HeightSource = Field(
+        "076", description="label of the GNSS height: 076 above mean sea level, or 370 above the ellipsoid, with EGM96"
+    )
+    position_gate: bool = Field(
+        True, description="demand that the GNSS receiver vouches for its position with labels 273 and 130"
+    )
 
     @property
     def pairs_needed(self) -> int:

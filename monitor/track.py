@@ -16,11 +16,15 @@ NS = 1e-9
 
 @dataclass(frozen=True)
 class Quantity:
-    """One quantity: its unit is in its name; `longest_gap_s` bounds interpolation and extrapolation; angles wrap."""
+    """One quantity: its unit is in its name; `longest_gap_s` bounds interpolation and extrapolation.
+
+    Angles wrap. A step holds its value until the next sample, as a mode or a flag does.
+    """
 
     name: str
     longest_gap_s: float
     angle: bool = False
+    step: bool = False
 
 
 class Values(NamedTuple):
@@ -61,7 +65,12 @@ class Track:
         self._end = place.stop
 
     def at(self, time_ns: NDArray[np.int64]) -> Values:
-        """The quantity at times i8 (n,): linear between two normal samples, and shortly beyond the last two."""
+        """The quantity at times i8 (n,): linear between two normal samples, and shortly beyond the last two.
+
+        A step is what its last sample before the time said.
+        """
+        if self.quantity.step:
+            return self._held(time_ns)
         if self._end < 2:
             return Values(np.zeros(len(time_ns)), np.full(len(time_ns), MISSING, np.uint8))
         times, values, statuses = self._time[: self._end], self._value[: self._end], self._status[: self._end]
@@ -80,6 +89,16 @@ class Track:
         if self.quantity.angle:
             value = wrap(value)
         return Values(np.where(status == NORMAL, value, 0.0), status)
+
+    def _held(self, time_ns: NDArray[np.int64]) -> Values:
+        if not self._end:
+            return Values(np.zeros(len(time_ns)), np.full(len(time_ns), MISSING, np.uint8))
+        times = self._time[: self._end]
+        last = np.searchsorted(times, time_ns, side="right") - 1
+        status = self._status[last]
+        status[(time_ns - times[last] > round(self.quantity.longest_gap_s / NS)) & (status == NORMAL)] = STALE
+        status[last < 0] = MISSING
+        return Values(np.where(status == NORMAL, self._value[last], 0.0), status)
 
     @property
     def newest(self) -> tuple[int, float, int] | None:

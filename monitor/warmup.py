@@ -38,5 +38,5 @@ def warm_up(monitor: Monitor) -> None:
         missing=0,
         repeated=0,
     )
-    settings = monitor.settings.model_copy(update={"minimum_pairs": 2})
+    settings = monitor.settings.model_copy(update={"minimum_pairs": 2, "position_gate": False})
     Monitor(monitor.terrain, settings).judge(scan, aircraft)

@@ -1,11 +1,15 @@
 """What a bridge says of itself, and what it lost."""
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from decoders import formats as f
 from decoders.racklink import ChannelCount, Framer, Hello, HelloChannel, Packet
 from gateway.config import AdapterConfig
 from gateway.link import Channel429, Channel708, Link
+from tests.decoders.bus import word429
 
 
 def make(**channels: object) -> Link:
@@ -69,7 +73,7 @@ def test_a_hello_tells_equipment_and_orientation(kind: int, orientation: int, na
     link.hello(said(3, kind, orientation, 0x04))
     channel = link.channels[3]
     assert isinstance(channel, Channel429)
-    assert (channel.equipment, channel.definitions.name, channel.orientation) == (4, "iru_704", name)
+    assert (channel.definitions.name, channel.orientation) == ("iru_704", name)
 
 
 def test_a_hello_names_a_radar_channel() -> None:
@@ -98,7 +102,7 @@ def test_configured_channels_win_over_the_hello() -> None:
     assert link.channels == configured
     channel = configured[1]
     assert isinstance(channel, Channel429)
-    assert (channel.definitions.name, channel.orientation, channel.equipment) == ("adc_706", "label_swapped", 6)
+    assert (channel.definitions.name, channel.orientation) == ("adc_706", "label_swapped")
     assert configured[2] == Channel708("wxr2100_6bit")
 
 
@@ -114,3 +118,49 @@ def test_all_counters_hold_the_framers_too() -> None:
     counters = count(make(), 0).all_counters()
     assert set(Framer().counters()) <= set(counters)
     assert counters["packets"] == 1
+
+
+def equipment_words(*equipment: int, odd: bool = True) -> NDArray[np.uint32]:
+    return np.array([word429(0o377, {11: (number, 12)}, odd=odd) for number in equipment], np.uint32)
+
+
+def test_a_channel_that_nobody_announced_is_taken_by_its_own_equipment_label_said_twice() -> None:
+    link = make()
+    assert link.identify(3, equipment_words(0x00B)) is None
+    assert link.identify(3, equipment_words(0x004, 0x00B)) is None
+    assert link.identify(3, equipment_words(0x00B)) == "gnss_743a"
+    channel = link.channels[3]
+    assert isinstance(channel, Channel429)
+    assert channel.definitions.name == "gnss_743a"
+
+
+def test_neither_damaged_nor_unknown_equipment_labels_take_a_channel() -> None:
+    link = make()
+    assert link.identify(3, equipment_words(0x00B, 0x00B, odd=False)) is None
+    assert link.identify(3, equipment_words(0x0FE, 0x0FE)) is None
+    assert link.identify(3, np.array([word429(0o377, {11: (0x00B, 12)}, ssm=1)] * 2, np.uint32)) is None
+    assert link.channels == {}
+
+
+def test_the_configuration_gives_a_channel_its_delays_and_its_rule_of_joining() -> None:
+    table = {
+        "kind": "arinc429",
+        "definitions": "iru_704",
+        "delays_ms": {"324": 20, "325": 7.5},
+        "join_rule": "toward_zero",
+    }
+    channel = make(n2=table).channels[2]
+    assert isinstance(channel, Channel429)
+    assert channel.join_rule == "toward_zero"
+    assert {label: delay for label, delay in enumerate(channel.delays_ns.tolist()) if delay} == {
+        0o324: 20_000_000,
+        0o325: 7_500_000,
+    }
+
+
+@pytest.mark.parametrize(
+    ("delays", "why"), [({"8": 1}, "three octal digits"), ({"324": -1}, "greater than or equal to 0")]
+)
+def test_a_delay_of_no_label_or_of_the_past_is_refused(delays: dict[str, float], why: str) -> None:
+    with pytest.raises(ValidationError, match=why):
+        make(n2={"kind": "arinc429", "delays_ms": delays})

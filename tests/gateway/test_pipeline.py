@@ -1,6 +1,7 @@
 """From records to events: what is used, what is refused and counted, and what is said of silence and loss."""
 
 from collections.abc import Iterable
+from datetime import UTC, datetime
 from typing import TypeVar
 
 import numpy as np
@@ -14,6 +15,7 @@ from gateway.records import Note, Record
 from monitor.integrity import Monitor
 from monitor.terrain import open_terrain
 from simulators import arinc429, arinc708, racklink
+from tests.decoders.bus import word429
 from tests.gateway.conftest import TERRAIN
 from tests.gateway.made import GNSS, IRU, RADAR, Bridge, raw, stamp, status, tick
 
@@ -320,3 +322,75 @@ def test_words_that_run_backwards_inside_a_packet_are_counted_and_not_used() -> 
     feed(pipeline, raw(0, 0, bridge.hello() + words))
     found = counters(pipeline)
     assert (found["bridge.malformed_bodies"], found["bridge.words_429_unused"]) == (1, 2)
+
+
+def test_a_channel_without_an_announcement_is_identified_by_label_377_and_then_used() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    equipment = word429(0o377, {11: (0x00B, 12)})
+    events = feed(
+        pipeline, *(raw(k, k, bridge.words(5, k, [equipment, *position()])) for k in range(1, 5)), tick(9, 4.1)
+    )
+    (told,) = [event for event in only(StatusEvent, events) if event.state == "IDENTIFIED"]
+    assert told.reason == "label 377 says what channel 5 is: read as gnss_743a from now on"
+    (state,) = only(StateEvent, events)
+    assert state.validity["latitude_deg"] == "NORMAL"
+
+
+def test_a_delay_moves_the_time_at_which_a_value_was_true() -> None:
+    """Pitch rises one LSB a millisecond; 20 ms of delay are 20 LSB."""
+    seen = []
+    for delay_ms in (0, 20):
+        channels = {IRU: {"kind": "arinc429", "definitions": "iru_704", "delays_ms": {"324": delay_ms}}}
+        rack = check_config({"adapters": [{"name": "bridge", "source": "serial:x", "channels": channels}]}, "test")
+        bridge, pipeline = Bridge(), Pipeline(rack, None)
+        packets = [bridge.words(IRU, k / 1000, [word429(0o324, {15: (k, 15)}, ssm=3)]) for k in range(0, 200, 10)]
+        (state,) = only(StateEvent, feed(pipeline, raw(1, 0.19, b"".join(packets)), tick(2, 0.19)))
+        seen.append(state.values["pitch_deg"])
+    assert seen[0] is not None
+    assert seen[1] is not None
+    assert (seen[1] - seen[0]) / (180 / 2**14) == pytest.approx(20)
+
+
+def test_findings_about_a_bus_are_events_and_counted() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    pitch = word429(0o324, {}, ssm=3)
+    packets = [bridge.words(IRU, k / 250, [pitch]) for k in range(500)]
+    events = feed(pipeline, raw(1, 0, bridge.hello() + b"".join(packets)))
+    (told,) = [event for event in only(StatusEvent, events) if event.state == "BUS_WRONG"]
+    assert (told.adapter, told.reason) == ("bridge/2", "label 324 comes every 4.0 ms, 10 is the shortest interval")
+    assert counters(pipeline)["bridge/2.bus_wrong"] == 1
+    assert counters(pipeline)["bridge.channel_2.peak_words_per_s"] == 250
+
+
+def test_a_channel_that_falls_silent_is_told_although_its_bridge_goes_on() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    feed(pipeline, raw(1, 0, bridge.hello() + bridge.words(GNSS, 0, position())))
+    records = [record for k in range(1, 9) for record in (raw(2 * k, k, bridge.heartbeat(k)), tick(2 * k + 1, k + 0.1))]
+    told = [event for event in only(StatusEvent, feed(pipeline, *records)) if event.state == "QUIET"]
+    assert [(event.adapter, event.reason) for event in told] == [("bridge/1", "no words for 5.1 s")]
+
+
+def test_a_position_joined_by_the_wrong_rule_is_told_and_degrades_the_next_verdict(monitor: Monitor) -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, monitor)
+    records: list[Record] = [raw(0, 0, bridge.hello())]
+    for k in range(30):
+        steps = round((44.0 + 9e-4 * k) * 2**31 / 180)  # flying north, in the south, by a box that counts from zero
+        coarse, fine = divmod(steps, 2048)
+        words = [word429(0o110, {9: (-coarse & 0x1FFFFF, 21)}, 3), word429(0o120, {18: (fine, 11)}, 3)]
+        records += [raw(2 * k + 1, k, bridge.words(GNSS, k, words)), tick(2 * k + 2, k + 0.5)]
+    (told,) = [event for event in only(StatusEvent, feed(pipeline, *records)) if event.state == "JOIN_RULE"]
+    assert told.adapter == "latitude_deg"
+    assert "set join_rule of the channel" in told.reason
+    (verdict,) = only(IntegrityEvent, feed(pipeline, raw(99, 30, sweep(bridge, 30))))
+    assert any(reason.startswith("degraded: latitude_deg: joined by") for reason in verdict.reasons)
+
+
+def test_the_state_tells_utc_as_the_receiver_has_it() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    date = word429(0o260, {24: (1, 4), 19: (6, 4), 15: (2, 4), 11: (6, 4)})
+    time = word429(0o150, {24: (12, 5), 11: (1, 1)}, ssm=3)
+    (state,) = only(
+        StateEvent, feed(pipeline, raw(1, 0, bridge.hello() + bridge.words(GNSS, 5, [date, time])), tick(2, 2.0))
+    )
+    assert state.values["utc_s"] == datetime(2026, 6, 1, 12, 0, 2, tzinfo=UTC).timestamp()
+    assert state.validity["utc_s"] == "NORMAL"

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from decoders.arinc429 import decode, load_definitions
-from monitor.aircraft import AXES, SOURCES, Aircraft, status_name
+from monitor.aircraft import AXES, LATITUDE, LONGITUDE, SOURCES, Aircraft, status_name
+from monitor.geoid import undulation_m
 from monitor.track import MISSING, STALE
 from tests.decoders.bus import word429
 
-GNSS, IRU, RADIO = 0x0B, 0x04, 0x07
-SETS = {GNSS: "gnss_743a", IRU: "iru_704", RADIO: "ra_707"}
+GNSS, IRU, RADIO, AIR_DATA, HYBRID, AHRS = 0x0B, 0x04, 0x07, 0x06, 0x38, 0x05
+SETS = {
+    GNSS: "gnss_743a", IRU: "iru_704", RADIO: "ra_707", AIR_DATA: "adc_706", HYBRID: "adiru_738", AHRS: "ahrs_705",
+}  # fmt: skip
 MS = 1_000_000
 NORMAL_SSM, NO_COMPUTED_DATA_SSM = 3, 1
 NO_COMPUTED_DATA = 1
@@ -22,7 +25,8 @@ def feed(aircraft: Aircraft, equipment: int, words: list[tuple[int, int]]) -> No
     """Words as (time in ms, word)."""
     times = np.array([time for time, _ in words], np.int64) * MS
     raw = np.array([word for _, word in words], np.uint32)
-    aircraft.feed(equipment, times, raw, decode(raw, load_definitions(SETS[equipment])))
+    definitions = load_definitions(SETS[equipment])
+    aircraft.feed(definitions, times, raw, decode(raw, definitions))
 
 
 def coarse_and_fine(label: int, degrees: float, coarse_ssm: int = 3, fine_ssm: int = 3) -> tuple[int, int]:
@@ -96,8 +100,7 @@ def test_labels_of_other_equipment_give_nothing() -> None:
     """Label 314 is a true heading on an inertial bus, and something else elsewhere."""
     aircraft = Aircraft()
     words = [(t, word429(0o314, {14: (0x1000, 16)}, ssm=NORMAL_SSM)) for t in (0, 40)]
-    raw = np.array([word for _, word in words], np.uint32)
-    aircraft.feed(0x06, np.array([0, 40 * MS]), raw, decode(raw, load_definitions("iru_704")))
+    feed(aircraft, AIR_DATA, words)
     assert all(track.newest is None for track in aircraft.tracks.values())
     feed(aircraft, IRU, words)
     assert [name for name, track in aircraft.tracks.items() if track.newest] == ["heading_deg"]
@@ -111,6 +114,17 @@ def test_labels_of_other_equipment_give_nothing() -> None:
         (IRU, 0o314, {14: (2**15 // 4 * 3, 16)}, "heading_deg", 135.0),
         (IRU, 0o324, {14: (2**16 - 1820, 16)}, "pitch_deg", -1820 * 180 / 2**15),
         (IRU, 0o325, {14: (2**15 // 8, 16)}, "roll_deg", 22.5),
+        (IRU, 0o321, {18: (2**12 - 64, 12)}, "drift_deg", -64 * 180 / 2**11),
+        (IRU, 0o365, {14: (2**16 - 600, 16)}, "up_velocity_m_s", -10 * 0.3048),
+        (IRU, 0o366, {14: (8 * 36, 16)}, "north_velocity_m_s", 36 * 1852 / 3600),
+        (AHRS, 0o365, {14: (600, 16)}, "up_velocity_m_s", 10 * 0.3048),
+        (HYBRID, 0o324, {15: (2**15 // 8, 15)}, "pitch_deg", 45.0),
+        (HYBRID, 0o261, {9: (8 * 1000, 21)}, "hybrid_height_m", 304.8),
+        (AIR_DATA, 0o203, {12: (5000, 18)}, "pressure_altitude_m", 1524.0),
+        (AIR_DATA, 0o210, {14: (16 * 90, 16)}, "true_airspeed_m_s", 46.3),
+        (GNSS, 0o130, {12: (2**13, 17)}, "horizontal_integrity_limit_m", 1852.0),
+        (GNSS, 0o247, {11: (2**14, 18)}, "horizontal_figure_of_merit_m", 1852.0),
+        (GNSS, 0o370, {9: (8 * 100, 21)}, "ellipsoid_height_m", 30.48),
         (RADIO, 0o164, {13: (8 * 1000, 17)}, "radio_height_m", 304.8),
     ],
 )
@@ -130,7 +144,7 @@ def test_inertial_position_never_stands_in_for_the_satellites() -> None:
         "inertial_longitude_deg",
         "inertial_height_m",
     }
-    assert {axis.equipment for axis in AXES} == {GNSS}
+    assert {axis.equipment for axis in AXES if axis.quantity in (LATITUDE, LONGITUDE)} == {(GNSS,)}
     aircraft = Aircraft()
     feed(aircraft, IRU, [(t, word429(0o310, {9: (2**18, 21)}, ssm=NORMAL_SSM)) for t in (0, 100)])
     assert aircraft.tracks["inertial_latitude_deg"].newest == (100 * MS, 45.0, 0)
@@ -146,3 +160,54 @@ def test_an_invalid_word_marks_its_quantity_with_the_status_of_the_bus() -> None
 def test_a_status_is_named_as_it_stands_in_reasons() -> None:
     names = [status_name(code) for code in (NO_COMPUTED_DATA, 4, STALE, MISSING)]
     assert names == ["NO_COMPUTED_DATA", "BAD_PARITY", "STALE", "MISSING"]
+
+
+def test_the_same_label_in_metres_or_miles_gives_the_same_quantity() -> None:
+    """247 is a figure of merit in metres from a 743, in nautical miles from a 743A."""
+    for name, field_, expected in (("gnss_743", {14: (32 * 9, 15)}, 9.0), ("gnss_743a", {11: (2**14, 18)}, 1852.0)):
+        aircraft, definitions = Aircraft(), load_definitions(name)
+        raw = np.array([word429(0o247, field_, ssm=NORMAL_SSM)], np.uint32)
+        aircraft.feed(definitions, np.array([0]), raw, decode(raw, definitions))
+        assert aircraft.tracks["horizontal_figure_of_merit_m"].newest == (0, expected, 0)
+
+
+def test_discrete_bits_hold_until_the_next_word_and_grow_stale() -> None:
+    aircraft = Aircraft()
+    for time, failure in ((0, 0), (1000, 1)):
+        feed(aircraft, GNSS, [(time, word429(0o130, {11: (failure, 1), 12: (800, 17)}, ssm=NORMAL_SSM))])
+    found = aircraft.tracks["gnss_satellite_failure"].at(np.array([-1, 0, 999, 1000, 3500, 3501]) * MS)
+    assert found.status.tolist() == [MISSING, 0, 0, 0, 0, STALE]
+    assert found.value.tolist() == [0, 0, 0, 1, 1, 0]
+
+
+def test_two_sources_of_one_quantity_are_never_mixed() -> None:
+    """An IRU and an ADIRU both send pitch; the second is taken only once the first has been silent long enough."""
+    aircraft = Aircraft()
+    for time in range(0, 200, 20):
+        feed(aircraft, IRU, [(time, word429(0o324, {15: (910, 15)}, ssm=NORMAL_SSM))])
+        feed(aircraft, HYBRID, [(time + 7, word429(0o324, {15: (2730, 15)}, ssm=NORMAL_SSM))])
+    one, other = 910 * 180 / 2**14, 2730 * 180 / 2**14
+    assert aircraft.tracks["pitch_deg"].at(np.array([90 * MS])).value.tolist() == [one]
+    for time in (500, 701, 721):  # 500 ms is twice what pitch may be silent
+        feed(aircraft, HYBRID, [(time, word429(0o324, {15: (2730, 15)}, ssm=NORMAL_SSM))])
+    found = aircraft.tracks["pitch_deg"].at(np.array([90, 710]) * MS)
+    assert (found.status.tolist(), found.value[1]) == ([STALE, 0], other)
+
+
+def test_the_height_can_come_from_the_ellipsoid_and_the_geoid() -> None:
+    aircraft = Aircraft(height_source="370")
+    for time in (0, 200):
+        for label, degrees in ((0o110, 44.37514), (0o111, -71.71874)):
+            words = coarse_and_fine(label, degrees)
+            feed(aircraft, GNSS, [(time, words[0]), (time + 2, words[1])])
+        feed(aircraft, GNSS, [(time + 4, word429(0o370, {9: (8 * 2500, 21)}, ssm=NORMAL_SSM))])
+        feed(aircraft, GNSS, [(time + 6, word429(0o076, {9: (8 * 9000, 21)}, ssm=NORMAL_SSM))])
+    newest = aircraft.tracks["height_m"].newest
+    assert newest is not None
+    assert newest[1] == pytest.approx(2500 * 0.3048 - undulation_m(44.37514, -71.71874), abs=1e-3)
+
+
+def test_a_height_over_the_ellipsoid_without_a_position_is_no_height() -> None:
+    aircraft = Aircraft(height_source="370")
+    feed(aircraft, GNSS, [(t, word429(0o370, {9: (8 * 2500, 21)}, ssm=NORMAL_SSM)) for t in (0, 200)])
+    assert aircraft.tracks["height_m"].at(np.array([100 * MS])).status.tolist() == [NO_COMPUTED_DATA]

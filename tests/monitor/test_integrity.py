@@ -15,13 +15,14 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, ncx2
 
 from decoders.formats import MODES_708
-from monitor.aircraft import Aircraft
+from monitor.aircraft import GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE, Aircraft
 from monitor.calibration import NO_CALIBRATION, Calibration
 from monitor.integrity import NEEDED, Comparison, Monitor, Verdict, thin
 from monitor.prediction import Beam, Pointing, predict
 from monitor.scans import Scan
 from monitor.settings import LeverArm, MonitorSettings
 from monitor.terrain import Terrain
+from monitor.track import Track
 
 MS = 1_000_000
 ANGLES = np.arange(-90.0, 91.0, 3.0)
@@ -43,11 +44,15 @@ CALIBRATED = Calibration(
 DEFAULTS_IN_USE = "no calibration loaded: stated defaults in use"
 
 
+NAVIGATION = 0b01100
+VOUCHED = {"gnss_mode": NAVIGATION, "horizontal_integrity_limit_m": 185.2, "gnss_satellite_failure": 0.0}
+
+
 def flying(**changed: float) -> Aircraft:
     """Level flight over the White Mountains, with a sample of everything 100 ms before and after the scan."""
     aircraft = Aircraft()
-    for quantity in NEEDED:
-        value = {**HERE, **changed}.get(quantity.name, 0.0)
+    for quantity in (*NEEDED, GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE):
+        value = {**HERE, **VOUCHED, **changed}.get(quantity.name, 0.0)
         aircraft.tracks[quantity.name].append(np.array([0, 200 * MS]), np.full(2, value), np.zeros(2, np.uint8))
     return aircraft
 
@@ -301,6 +306,42 @@ def test_a_stale_state_is_named(white_mountains: Terrain, honest: Scan) -> None:
     assert verdict.reasons == tuple(
         f"{name}: STALE on 61 of 61 radials" for name in ("pitch_deg", "roll_deg", "heading_deg")
     )
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ({"gnss_mode": 0b01000}, "the GNSS receiver's mode is acquisition"),
+        ({"gnss_mode": 0b11111}, "the GNSS receiver's mode is fault"),
+        ({"horizontal_integrity_limit_m": 16 * 1852 * (1 - 2**-17)}, "states no horizontal integrity limit"),
+        ({"gnss_satellite_failure": 1.0}, "has detected a satellite failure"),
+    ],
+)
+def test_a_position_that_the_receiver_does_not_vouch_for_gives_no_verdict(
+    white_mountains: Terrain, honest: Scan, said: dict[str, float], why: str
+) -> None:
+    reason = refused(white_mountains, honest, flying(**said))
+    assert why in reason
+    assert f"on {len(ANGLES)} of {len(ANGLES)} radials" in reason
+    trusting = MonitorSettings(position_gate=False)
+    assert judge(white_mountains, honest, flying(**said), settings=trusting)[0].verdict == "ok"
+
+
+@pytest.mark.parametrize("mode", [0b01100, 0b01101, 0b01111, 0b10000, 0b11000])
+def test_every_mode_that_navigates_is_good_enough(white_mountains: Terrain, honest: Scan, mode: int) -> None:
+    assert judge(white_mountains, honest, flying(gnss_mode=mode))[0].verdict == "ok"
+
+
+def test_a_receiver_that_never_says_its_mode_or_limit_is_not_vouched_for(
+    white_mountains: Terrain, honest: Scan
+) -> None:
+    aircraft = flying()
+    for name in VOUCHED:
+        aircraft.tracks[name] = Track(aircraft.tracks[name].quantity)
+    verdict, _ = Monitor(white_mountains, None, CALIBRATED).judge(honest, aircraft)
+    assert verdict.verdict == "unavailable"
+    assert [reason.partition(":")[0] for reason in verdict.reasons] == ["gnss_mode", "horizontal_integrity_limit_m"]
+    assert all("MISSING" in reason for reason in verdict.reasons)
 
 
 def test_radials_beyond_the_stabilisation_s_limits_are_refused(white_mountains: Terrain, honest: Scan) -> None:

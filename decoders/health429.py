@@ -1,0 +1,129 @@
+"""How well an ARINC 429 bus behaves: intervals, load, equipment, and whether the words are read the right way.
+
+Findings are told when they begin and when they end, never word by word. Nothing is judged on less than a second of bus.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from decoders.arinc429 import Status, Values429
+from decoders.definitions import Definitions
+from decoders.formats import KIND_429_LOW
+
+MOST_WORDS_PER_S: Final = {"high": 1e5 / 36, "low": 12.5e3 / 36}  # 36 bit times a word, its gap included
+TOO_FAST: Final = 0.8  # of the shortest interval, on average over a second
+TOO_SLOW: Final = 1.5  # of the longest
+OVERLOAD: Final = 1.02  # of what the bus carries, for two clocks that differ
+EQUIPMENT: Final = 0o377
+ENOUGH_WORDS: Final = 100  # before reading order and parity are judged
+FEW, MOST = 0.2, 0.8
+SECOND_NS: Final = 1_000_000_000
+TURNED: Final = np.array([int(f"{label:08b}"[::-1], 2) for label in range(256)], np.uint8)
+
+
+class Finding(NamedTuple):
+    """Something that is wrong with a bus, or is no longer. `about` tells findings apart: a label, or what is judged."""
+
+    about: str
+    wrong: bool
+    reason: str
+
+
+@dataclass
+class _Rate:
+    """Words of one label since it was last judged, the last one of before included, and when they came."""
+
+    first_ns: int
+    last_ns: int
+    count: int = 0
+
+
+class BusHealth:
+    """One channel. `peak_words_per_s` is the highest load of any whole second."""
+
+    def __init__(self, definitions: Definitions, orientation: str, kind: int) -> None:
+        self.peak_words_per_s = 0.0
+        self._definitions = definitions
+        self._orientation = orientation
+        self._speed = "low" if kind == KIND_429_LOW else "high"
+        self._is_known = np.isin(np.arange(256), list(definitions.labels))
+        self._rates: dict[int, _Rate] = {}
+        self._wrong: set[str] = set()
+        self._second_ns: int | None = None  # when the current second began
+        self._words = 0
+        self._known = Counter[str]()  # words since reading was last judged, by what they say of it
+
+    def feed(self, time_ns: npt.NDArray[np.int64], values: Values429) -> Iterator[Finding]:
+        """Take one decoded block (n,) with the device times of its words; give what has changed."""
+        now_ns = int(time_ns[-1])
+        if self._second_ns is None or now_ns < self._second_ns:  # the first word, or a clock that began anew
+            self._second_ns = int(time_ns[0])
+            self._rates.clear()
+            self._words = -1  # its first word opens the second and is not of it
+        good = values.status != Status.BAD_PARITY
+        labels = values.label[good]
+        self._words += len(values.label)
+        self._known["bad parity"] += len(values.label) - len(labels)
+        self._known["good"] += len(labels)
+        self._known["known"] += int(self._is_known[labels].sum())
+        self._known["known if turned"] += int(self._is_known[TURNED[labels]].sum())
+        for label, at_ns in zip(labels.tolist(), time_ns[good].tolist(), strict=True):
+            rate = self._rates.setdefault(label, _Rate(at_ns, at_ns))
+            rate.last_ns = at_ns
+            rate.count += 1
+        for said in values.value[(values.label == EQUIPMENT) & (values.status == Status.NORMAL)].astype(int).tolist():
+            reason = f"the box says it is equipment {said:03X}, it is read as {self._definitions.name}"
+            yield from self._tell("equipment", said & 0xFF != self._definitions.equipment_id & 0xFF, reason)
+        if now_ns - self._second_ns >= SECOND_NS:
+            yield from self._judge(now_ns)
+
+    def _judge(self, now_ns: int) -> Iterator[Finding]:
+        load = self._words * SECOND_NS / (now_ns - (self._second_ns or 0))
+        self.peak_words_per_s = max(self.peak_words_per_s, load)
+        most = MOST_WORDS_PER_S[self._speed]
+        reason = f"{load:.0f} words/s, a {self._speed} speed bus carries {most:.1f} at most"
+        yield from self._tell("load", load > OVERLOAD * most, reason)
+        for label, rate in self._rates.items():
+            yield from self._rate(label, rate, now_ns)
+        if self._known["good"] + self._known["bad parity"] >= ENOUGH_WORDS:
+            yield from self._reading()
+        self._second_ns, self._words = now_ns, 0
+
+    def _rate(self, label: int, rate: _Rate, now_ns: int) -> Iterator[Finding]:
+        definition = self._definitions.labels.get(label)
+        shortest, longest = definition.interval_ms if definition and definition.interval_ms else (0.0, None)
+        if rate.count > 1:
+            mean_ms = (rate.last_ns - rate.first_ns) / 1e6 / (rate.count - 1)
+            fast = f"label {label:03o} comes every {mean_ms:.1f} ms, {shortest:g} is the shortest interval"
+            yield from self._tell(f"rate of {label:03o}", mean_ms < TOO_FAST * shortest, fast)
+            rate.first_ns, rate.count = rate.last_ns, 1
+        if longest:
+            silent_ms = (now_ns - rate.last_ns) / 1e6
+            stale = f"label {label:03o} has not come for {silent_ms:.0f} ms, {longest:g} is the longest interval"
+            yield from self._tell(f"label {label:03o}", silent_ms > TOO_SLOW * longest, stale)
+
+    def _reading(self) -> Iterator[Finding]:
+        good, bad = self._known["good"], self._known["bad parity"]
+        noisy = f"parity is bad in {bad} of {good + bad} words: noise, or bits in another order"
+        yield from self._tell("parity", bad > FEW * (good + bad), noisy)
+        if good:
+            known, turned = self._known["known"] / good, self._known["known if turned"] / good
+            name = self._definitions.name
+            order = (
+                f"{known:.0%} of the labels belong to {name}, {turned:.0%} if read the other way round: "
+                f"check the channel's orientation, which is {self._orientation!r}"
+            )
+            yield from self._tell("orientation", known < FEW and turned > MOST, order)
+            other = f"{known:.0%} of the labels belong to {name}: check the channel's definitions"
+            yield from self._tell("definitions", known < FEW and turned <= MOST, other)
+        self._known.clear()
+
+    def _tell(self, about: str, wrong: bool, reason: str) -> Iterator[Finding]:
+        if wrong != (about in self._wrong):
+            (self._wrong.add if wrong else self._wrong.discard)(about)
+            yield Finding(about, wrong, reason if wrong else f"{about} is in order again")

@@ -1,0 +1,39 @@
+"""Whether the GNSS receiver itself vouches for its position: its mode (273), its integrity limit (130), and a failure.
+
+A normal sign/status matrix on 110 and 111 says that a position was computed, not that it can be relied on.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from monitor.aircraft import GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE, Aircraft, status_name
+from monitor.geodesy import NM_M
+
+# Bits 28 to 26 of label 273; bits 25 and 24 only tell kinds of navigation apart.
+MODES: Final = (
+    "self test", "initialisation", "acquisition", "navigation", "altitude aiding", "reserved", "aided", "fault",
+)  # fmt: skip
+USABLE_MODES: Final = (3, 4, 6)
+NO_LIMIT_M: Final = 15.99 * NM_M  # label 130 at its end of scale: the receiver has no limit to give
+
+
+def position_doubts(aircraft: Aircraft, time_ns: NDArray[np.int64]) -> tuple[NDArray[np.bool_], list[str]]:
+    """At which times (n,) the position is not vouched for, and why, with the number of times."""
+    mode, limit, failure = (
+        aircraft.tracks[quantity.name].at(time_ns) for quantity in (GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE)
+    )
+    kind = mode.value.astype(np.intp) >> 2
+    known = (mode.status == 0) & (limit.status == 0)
+    doubts: dict[str, NDArray[np.bool_]] = {}
+    for name, values in ((GNSS_MODE.name, mode), (INTEGRITY_LIMIT.name, limit)):
+        for status in np.unique(values.status[values.status > 0]).tolist():
+            doubts[f"{name}: {status_name(status)}"] = values.status == status
+    for code in np.unique(kind[known]).tolist():
+        if code not in USABLE_MODES:
+            doubts[f"the GNSS receiver's mode is {MODES[code]}"] = known & (kind == code)
+    doubts["the GNSS receiver states no horizontal integrity limit"] = known & (limit.value >= NO_LIMIT_M)
+    doubts["the GNSS receiver has detected a satellite failure"] = known & (failure.value > 0)
+    reasons = [f"{why} on {np.count_nonzero(at)} of {len(time_ns)} radials" for why, at in doubts.items() if at.any()]
+    return np.logical_or.reduce(list(doubts.values())), reasons

@@ -1,0 +1,44 @@
+"""Whether coarse and fine position words are joined by the right rule; the wrong one leaves a sawtooth.
+
+South of the equator and west of Greenwich the two rules part: added or subtracted, the fine word puts the position up
+to two coarse steps of 0.000172 degrees apart. A flight path is smooth, so the rule with the smaller second differences
+is the true one. In the north and east both rules give the same and nothing can be said, nor needs to be.
+"""
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from decoders.arinc429 import JOIN_RULES, JoinRule, join_position
+
+EPOCHS = 20  # looked at, after each of which the rules are compared
+ROUGH_DEG = 5e-5  # mean second difference that no flight and no receiver has: 5 m from one epoch to the next
+CLEARLY = 4.0
+
+
+class JoinCheck:
+    """Fed with every joined pair of one coordinate."""
+
+    def __init__(self) -> None:
+        self._joined: dict[str, deque[float]] = {rule: deque(maxlen=EPOCHS) for rule in JOIN_RULES}
+        self._rule: JoinRule = "concatenate"
+
+    def feed(self, coarse: NDArray[np.uint32], fine: NDArray[np.uint32], rule: JoinRule) -> None:
+        """Take one pair of raw words (1,), joined by `rule`."""
+        self._rule = rule
+        for name in JOIN_RULES:
+            self._joined[name].append(float(join_position(coarse, fine, name)[0]))
+
+    def doubt(self) -> str | None:
+        """Why the other rule seems to be the right one, or None."""
+        if len(self._joined[self._rule]) < EPOCHS:
+            return None
+        roughness = {rule: float(np.mean(np.abs(np.diff(joined, 2)))) for rule, joined in self._joined.items()}
+        (other,) = set(JOIN_RULES) - {self._rule}
+        if roughness[self._rule] < max(ROUGH_DEG, CLEARLY * roughness[other]):
+            return None
+        return (
+            f"joined by {self._rule!r} the position jumps {roughness[self._rule]:.6f} deg from epoch to epoch, "
+            f"by {other!r} {roughness[other]:.6f}: set join_rule of the channel"
+        )

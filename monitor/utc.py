@@ -1,0 +1,71 @@
+"""UTC of the GNSS receiver: date (260), time of day (150), its fraction (140) and the fraction's fraction (141).
+
+The words of one set belong together, but their order on the bus is free and around midnight the time may roll over
+before the date: the day is chosen that lies nearest to where the last set said we are. In a leap second 150 counts to
+23:59:60, which is the same count of seconds as the midnight after it.
+"""
+
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from decoders import arinc429
+from decoders.arinc429 import Status, Values429
+from decoders.definitions import Definitions
+
+DATE, TIME, FRACTION, FINE_FRACTION = 0o260, 0o150, 0o140, 0o141
+UTC_LABELS: Final = frozenset({DATE, TIME, FRACTION, FINE_FRACTION})
+SET_NS: Final = 40_000_000  # a set is sent in one burst
+DATE_NS: Final = 2_500_000_000  # how long a date holds without another
+DAY_NS: Final = 86_400_000_000_000
+EPOCH_2000_NS: Final = 946_684_800_000_000_000  # 2000-01-01 after 1970-01-01
+
+
+class Utc(NamedTuple):
+    """UTC, ns since 1970 without leap seconds, and whether the receiver calls it precise."""
+
+    utc_ns: int
+    precise: bool
+
+
+@dataclass
+class UtcClock:
+    """Fed with the time words of one receiver; says UTC at any later time of the same clock."""
+
+    _parts: dict[int, tuple[int, float]] = field(default_factory=dict)  # label -> when sent, value
+    _precise: bool = False
+    _offset_ns: int | None = None  # UTC minus the clock of the stamps, at the last set
+    _set_ns: int = 0
+
+    def feed(self, time_ns: int, word: int, values: Values429, k: int, definitions: Definitions) -> None:
+        """Take word k of a decoded block, sent at `time_ns`; a word that is not normal ends what was known."""
+        label = int(values.label[k])
+        if values.status[k] != Status.NORMAL:
+            self._parts.pop(label, None)
+            return
+        self._parts[label] = time_ns, float(values.value[k])
+        if label == TIME:
+            self._precise = bool(arinc429.field([word], definitions.labels[TIME], "precise")[0])
+        if label != DATE:
+            self._complete(time_ns)
+
+    def at(self, time_ns: int) -> Utc | None:
+        """UTC at a time of the words' clock, or None while no set has come."""
+        return None if self._offset_ns is None else Utc(time_ns + self._offset_ns, self._precise)
+
+    def _complete(self, now_ns: int) -> None:
+        parts = self._parts
+        if TIME not in parts or DATE not in parts or now_ns - parts[DATE][0] > DATE_NS:
+            return
+        sent_ns, seconds = parts[TIME]
+        if now_ns - sent_ns > SET_NS:  # a fraction of the next set, whose time is still to come
+            return
+        near = [parts[x][1] for x in (FRACTION, FINE_FRACTION) if x in parts and abs(parts[x][0] - sent_ns) <= SET_NS]
+        if FRACTION in parts and not near:
+            return
+        utc_ns = (
+            EPOCH_2000_NS + round(parts[DATE][1]) * DAY_NS + round(seconds) * 1_000_000_000 + round(sum(near) * 1e9)
+        )
+        if self._offset_ns is not None and sent_ns >= self._set_ns:
+            expected_ns = sent_ns + self._offset_ns
+            utc_ns = min((utc_ns + days * DAY_NS for days in (0, -1, 1)), key=lambda ns: abs(ns - expected_ns))
+        self._offset_ns, self._set_ns = utc_ns - sent_ns, sent_ns

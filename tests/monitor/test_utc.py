@@ -1,0 +1,134 @@
+"""UTC of the receiver, in the order of a real set and of every other, and around every seam of the calendar."""
+
+from datetime import UTC, datetime, timedelta
+from fractions import Fraction
+from itertools import permutations
+
+import pytest
+
+from decoders.arinc429 import decode, load_definitions
+from monitor.utc import UtcClock
+from tests.decoders.bus import word429
+
+GNSS = load_definitions("gnss_743a")
+MS = 1_000_000
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def date(day: datetime) -> int:
+    digits = {28: (day.day // 10, 2), 24: (day.day % 10, 4), 23: (day.month // 10, 1), 19: (day.month % 10, 4)}
+    return word429(0o260, {**digits, 15: (day.year % 100 // 10, 4), 11: (day.year % 10, 4)})
+
+
+def time(hours: int, minutes: int, seconds: int, precise: bool = True, ssm: int = 3) -> int:
+    return word429(0o150, {24: (hours, 5), 18: (minutes, 6), 12: (seconds, 6), 11: (int(precise), 1)}, ssm)
+
+
+def fraction(seconds: Fraction) -> tuple[int, int]:
+    coarse, rest = divmod(seconds * 2**20, 1)
+    return word429(0o140, {9: (int(coarse), 20)}, 3), word429(0o141, {19: (int(rest * 2**10), 10)}, 3)
+
+
+def whole(moment: datetime) -> list[int]:
+    return [
+        date(moment),
+        time(moment.hour, moment.minute, moment.second),
+        *fraction(Fraction(moment.microsecond, 10**6)),
+    ]
+
+
+def feed(clock: UtcClock, time_ms: int, words: list[int]) -> None:
+    """The words of a set, one a millisecond."""
+    for k, word in enumerate(words):
+        values = decode([word], GNSS)
+        clock.feed((time_ms + k) * MS, word, values, 0, GNSS)
+
+
+def utc_ns(moment: datetime) -> int:
+    return (moment - EPOCH) // timedelta(microseconds=1) * 1000
+
+
+@pytest.mark.parametrize("order", list(permutations(range(4))))
+def test_a_set_in_any_order_gives_its_instant_to_the_nanosecond(order: tuple[int, ...]) -> None:
+    moment = datetime(2026, 6, 1, 12, 34, 56, 750_000, UTC)
+    clock, words = UtcClock(), whole(moment)
+    feed(clock, 0, [date(moment)])
+    feed(clock, 5000, [date(moment)])
+    feed(clock, 5001, [words[k] for k in order])
+    at = clock.at((5001 + order.index(1)) * MS)  # when the time of day was sent
+    assert at is not None
+    assert at.precise
+    assert abs(at.utc_ns - utc_ns(moment)) <= 1
+
+
+def test_three_quarters_of_a_second_are_added_and_never_taken_away() -> None:
+    clock, moment = UtcClock(), datetime(2026, 6, 1, 0, 0, 1, 750_000, UTC)
+    feed(clock, 0, whole(moment))
+    at = clock.at(1 * MS)
+    assert at is not None
+    assert at.utc_ns % 10**9 == pytest.approx(750_000_000, abs=1)
+
+
+def test_without_fractions_the_time_of_day_is_enough() -> None:
+    clock, moment = UtcClock(), datetime(2026, 6, 1, 7, 8, 9, tzinfo=UTC)
+    feed(clock, 0, whole(moment)[:2])
+    assert clock.at(1 * MS) == (utc_ns(moment), True)
+
+
+@pytest.mark.parametrize("rolls_late", [0, 1, 2])
+def test_midnight_takes_no_day_and_gives_none_whichever_word_rolls_over_first(rolls_late: int) -> None:
+    """The date may stay behind the time, or run ahead of it, by up to two sets."""
+    before, clock = datetime(2027, 12, 31, 23, 59, 57, tzinfo=UTC), UtcClock()
+    for ahead in (False, True):
+        clock = UtcClock()
+        for second in range(7):
+            moment = before + timedelta(seconds=second)
+            dated = moment + timedelta(seconds=rolls_late if ahead else -rolls_late)
+            feed(clock, 1000 * second, [date(dated), *whole(moment)[1:]])
+            at = clock.at((1000 * second + 1) * MS)
+            assert at is not None
+            assert at.utc_ns == utc_ns(moment)
+
+
+def test_a_leap_second_is_the_second_before_midnight_counted_twice() -> None:
+    clock, day = UtcClock(), datetime(2016, 12, 31, tzinfo=UTC)
+    midnight = utc_ns(day + timedelta(days=1))
+    seen = []
+    for second, words in enumerate(
+        ([date(day), time(23, 59, 59)], [date(day), time(23, 59, 60)], [date(day + timedelta(days=1)), time(0, 0, 0)])
+    ):
+        feed(clock, 1000 * second, words)
+        at = clock.at((1000 * second + 1) * MS)
+        assert at is not None
+        seen.append(at.utc_ns - midnight)
+    assert seen == [-(10**9), 0, 0]
+
+
+def test_the_years_are_those_of_this_century() -> None:
+    clock, moment = UtcClock(), datetime(2099, 2, 28, 1, 2, 3, tzinfo=UTC)
+    feed(clock, 0, whole(moment))
+    assert clock.at(1 * MS) == (utc_ns(moment), True)
+
+
+def test_a_receiver_that_is_not_precise_yet_says_so() -> None:
+    clock, moment = UtcClock(), datetime(2026, 6, 1, tzinfo=UTC)
+    feed(clock, 0, [date(moment), time(0, 0, 0, precise=False)])
+    assert clock.at(1 * MS) == (utc_ns(moment), False)
+
+
+@pytest.mark.parametrize("late", [0, 1])
+def test_words_of_two_sets_are_never_mixed(late: int) -> None:
+    """The second set loses its time of day: its fraction must not be laid on the time of the first."""
+    clock, first = UtcClock(), datetime(2026, 6, 1, 12, 0, 0, 250_000, UTC)
+    feed(clock, 0, whole(first))
+    second = whole(first + timedelta(seconds=1, milliseconds=500))
+    feed(clock, 1500, [second[0], *second[2:]][late:])
+    at = clock.at(1501 * MS)
+    assert at is not None
+    assert at.utc_ns == utc_ns(first) + 1500 * MS
+
+
+def test_nothing_is_known_before_a_set_and_nothing_new_from_words_that_are_not_normal() -> None:
+    clock, moment = UtcClock(), datetime(2026, 6, 1, 12, 0, 0, tzinfo=UTC)
+    feed(clock, 0, [date(moment), time(12, 0, 0, ssm=1)])
+    assert clock.at(0) is None
