@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from decoders import arinc708
-from decoders.arinc429 import decode, load_definitions
 from decoders.racklink import Framer
 from monitor.geodesy import NM_M
 from monitor.prediction import Beam, Pointing, predict
@@ -76,19 +75,6 @@ def test_708_unpack(benchmark: BenchmarkFixture) -> None:
 def test_copy_of_the_708_output(benchmark: BenchmarkFixture) -> None:
     bins = RNG.integers(0, 8, (10_000, BINS), np.uint8)
     assert benchmark(bins.copy).shape == bins.shape
-
-
-@pytest.mark.benchmark(group="429 words to values, 100000 words")
-def test_429_decode(benchmark: BenchmarkFixture) -> None:
-    words = RNG.integers(0, 2**32, 100_000, np.uint32)
-    definitions = load_definitions("iru_704")
-    assert len(benchmark(lambda: decode(words, definitions)).value) == len(words)
-
-
-@pytest.mark.benchmark(group="429 words to values, 100000 words")
-def test_copy_of_the_429_output(benchmark: BenchmarkFixture) -> None:
-    values = RNG.random(100_000)
-    assert len(benchmark(values.copy)) == len(values)
 
 
 @pytest.fixture(scope="module")

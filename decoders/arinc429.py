@@ -48,7 +48,7 @@ def unpack(words: npt.ArrayLike, orientation: str = "wire") -> Words429:
         ssm=np.empty(n, np.uint8),
         parity_ok=np.empty(n, np.bool_),
     )
-    kernels429.unpack(array, _swapped(orientation), parts)
+    kernels429.unpack(array, _swapped(orientation), *parts)
     return parts
 
 
@@ -65,8 +65,8 @@ def decode(words: npt.ArrayLike, definitions: Definitions, orientation: str = "w
     """
     array = _words(words)
     n = array.size
-    values = Values429(label=np.empty(n, np.uint8), value=np.empty(n), status=np.empty(n, np.uint8))
-    kernels429.decode(array, _swapped(orientation), _table(definitions), values)
+    values = Values429(np.empty(n, np.uint8), np.empty(n), np.empty(n, np.uint8))
+    kernels429.decode(array, _swapped(orientation), _table(definitions), *values)
     return values
 
 
@@ -112,6 +112,8 @@ def text(words: npt.ArrayLike, definition: Definition) -> list[str]:
 
 def _words(words: npt.ArrayLike) -> npt.NDArray[np.uint32]:
     array = np.asarray(words)
+    if array.ndim == 1 and array.dtype == np.uint32 and array.flags.carray:  # as they come from a bus, live
+        return array
     if array.ndim != 1 or (array.size and array.dtype.kind not in "ui"):
         raise ValueError(f"words of shape {array.shape} and type {array.dtype}: pass a row of 32-bit unsigned integers")
     if array.dtype != np.uint32 and array.size and not 0 <= int(array.min()) <= int(array.max()) < 2**32:

@@ -11,7 +11,7 @@ from numba import njit
 
 from decoders.definitions import CHARACTER_BITS
 from decoders.formats import CLOCK_DIGITS, DATE_DIGITS, SSM_BCD_MINUS, TIME_FIELDS
-from decoders.results429 import Status, Values429, Words429
+from decoders.results429 import Status
 
 Int = int | np.int64
 
@@ -49,29 +49,42 @@ MONTH_DAYS: Final = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 
 
 @njit(cache=True)
-def unpack(words: npt.NDArray[np.uint32], swapped: bool, parts: Words429) -> None:
+def unpack(
+    words: npt.NDArray[np.uint32],
+    swapped: bool,
+    label: npt.NDArray[np.uint8],
+    sdi: npt.NDArray[np.uint8],
+    data: npt.NDArray[np.uint32],
+    ssm: npt.NDArray[np.uint8],
+    parity_ok: npt.NDArray[np.bool_],
+) -> None:
     """Fill the parts of each word."""
     for i in range(words.size):
         word = np.int64(words[i])
-        parts.label[i] = _label(word, swapped)
-        parts.sdi[i] = _bits(word, 9, 2)
-        parts.data[i] = _bits(word, 11, 19)
-        parts.ssm[i] = _bits(word, 30, 2)
-        parts.parity_ok[i] = _odd(word)
+        label[i] = _label(word, swapped)
+        sdi[i] = _bits(word, 9, 2)
+        data[i] = _bits(word, 11, 19)
+        ssm[i] = _bits(word, 30, 2)
+        parity_ok[i] = _odd(word)
 
 
 @njit(cache=True)
-def decode(words: npt.NDArray[np.uint32], swapped: bool, table: npt.NDArray[np.int64], values: Values429) -> None:
+def decode(
+    words: npt.NDArray[np.uint32],
+    swapped: bool,
+    table: npt.NDArray[np.int64],
+    label: npt.NDArray[np.uint8],
+    value: npt.NDArray[np.float64],
+    status: npt.NDArray[np.uint8],
+) -> None:
     """Fill label, value and status of each word; a row of `table` is a label's definition in the columns above."""
     for i in range(words.size):
         word = np.int64(words[i])
-        label = _label(word, swapped)
-        row = table[label]
+        label[i] = _label(word, swapped)
+        row = table[label[i]]
         integer = _integer(word, row)
-        status = _status(word, row, integer)
-        values.label[i] = label
-        values.status[i] = status
-        values.value[i] = integer * row[NUMERATOR] / row[DENOMINATOR] if status == NORMAL else 0.0
+        status[i] = _status(word, row, integer)
+        value[i] = integer * row[NUMERATOR] / row[DENOMINATOR] if status[i] == NORMAL else 0.0
 
 
 @njit(cache=True)

@@ -1,13 +1,19 @@
 """One bus word as rows of a table: field, bits, code, meaning."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from decoders import arinc429, arinc708
 from decoders import formats as f
-from decoders.definitions import DefinitionError, load_definitions
+from decoders.definitions import Definition, DefinitionError, Definitions, load_definitions, set_names
 from gateway.errors import GatewayError
 
 Row = tuple[str, str, str, str]
+
+SET_HEADINGS = ("set", "equipment", "labels")
+LABEL_HEADINGS = (
+    "label", "name", "encoding", "bits", "range", "LSB", "units", "positive", "interval (ms)", "confidence", "source",
+)  # fmt: skip
 
 
 def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]:
@@ -15,10 +21,7 @@ def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]
     word = int.from_bytes(_bytes(text.removeprefix("0x").zfill(8), (4,)), "big")
     if orientation not in f.ORIENTATIONS:
         raise GatewayError(f"orientation {orientation!r}: use one of {', '.join(f.ORIENTATIONS)}")
-    try:
-        definitions = load_definitions(definitions_name)
-    except (DefinitionError, ValueError, OSError) as error:
-        raise GatewayError(str(error)) from error
+    definitions = _definitions(definitions_name)
     block = np.array([word], np.uint32)
     parts = arinc429.unpack(block, orientation)
     values = arinc429.decode(block, definitions, orientation)
@@ -34,9 +37,65 @@ def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]
         ("SSM", "30-31", f"{ssm:02b}", meaning),
         ("parity", "32", f"{word >> 31}", "odd, good" if parts.parity_ok[0] else "BAD: the word is damaged"),
     ]
-    value = f"{values.value[0]:.12g} {definition.units}" if definition and status == 0 else "none"
-    rows.append(("value", "", value, status.name))
-    return rows
+    if definition is None:
+        return [*rows, ("value", "", "none", status.name)]
+    for field_name, (first, last) in definition.fields.items():
+        code = int(arinc429.field(block, definition, field_name)[0])
+        rows.append((field_name, _span(first, last), f"{code:0{last - first + 1}b}", str(code)))
+    first, last = definition.bits
+    sense = f", positive is {definition.positive}" if definition.positive else ""
+    value = _value(values, block, definition)
+    return [*rows, ("value", _span(first, last + (definition.encoding == "bnr")), value, status.name + sense)]
+
+
+def _value(values: arinc429.Values429, block: NDArray[np.uint32], definition: Definition) -> str:
+    if values.status[0] != arinc429.Status.NORMAL:
+        return "none"
+    if definition.encoding == "iso5":
+        return repr(arinc429.text(block, definition)[0])
+    return f"{values.value[0]:.12g} {definition.units}".strip()
+
+
+def _span(first: int, last: int) -> str:
+    return f"{first}" if first == last else f"{first}-{last}"
+
+
+def set_rows() -> list[tuple[str, ...]]:
+    """Rows under `SET_HEADINGS`."""
+    sets = [load_definitions(name) for name in set_names()]
+    return [(one.name, f"{one.equipment_id:03X}", str(len(one.labels))) for one in sets]
+
+
+def label_rows(definitions_name: str) -> list[tuple[str, ...]]:
+    """Rows under `LABEL_HEADINGS` for a set. Raises GatewayError for one that there is not."""
+    return [_label_row(row) for _, row in sorted(_definitions(definitions_name).labels.items())]
+
+
+def _label_row(row: Definition) -> tuple[str, ...]:
+    first, last = row.bits
+    shortest, longest = row.interval_ms or (None, None)
+    interval = "" if shortest is None else f"{shortest:g} to {longest:g}" if longest else f"{shortest:g} or more"
+    fields = "".join(f", {name} {_span(*bits)}" for name, bits in row.fields.items())
+    return (
+        f"{row.label:03o}",
+        row.name,
+        row.encoding,
+        _span(first, last + (row.encoding == "bnr")) + fields,
+        "" if row.range is None else f"{float(row.range):.12g}",
+        "" if row.encoding in ("disc", "iso5") else f"{float(row.lsb):.9g}",
+        row.units,
+        row.positive,
+        interval,
+        row.confidence,
+        row.source,
+    )
+
+
+def _definitions(name: str) -> Definitions:
+    try:
+        return load_definitions(name)
+    except (DefinitionError, ValueError, OSError) as error:
+        raise GatewayError(str(error)) from error
 
 
 def explain_708(text: str, profile_name: str) -> list[Row]:

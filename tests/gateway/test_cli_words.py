@@ -10,10 +10,23 @@ from typer.testing import CliRunner
 
 from gateway.cli import app
 from simulators import arinc429
+from tests.decoders.bus import word429
 from tests.gateway.shell import shadebus
 
 HEAVY = ("numpy", "numba", "scipy", "rasterio", "mcap", "matplotlib", "serial", "pydantic")
-VERBS = ("demo", "run", "simulate", "replay", "dump", "info", "thresholds", "doctor", "decode 429", "decode 708")
+VERBS = (
+    "demo",
+    "run",
+    "simulate",
+    "replay",
+    "dump",
+    "info",
+    "labels",
+    "thresholds",
+    "doctor",
+    "decode 429",
+    "decode 708",
+)
 
 
 def rows(text: str) -> list[list[str]]:
@@ -80,7 +93,8 @@ def test_arinc_429_words_are_explained_field_by_field() -> None:
     assert float(value) == pytest.approx(-2.5, abs=0.01)
     assert units == "deg"
     assert "BAD" in second["parity"][2]
-    assert second["value"][1:] == ["none", "BAD_PARITY"]
+    assert first["value"][2] == "NORMAL, positive is nose up"
+    assert second["value"][1:] == ["none", "BAD_PARITY, positive is nose up"]
 
 
 def test_a_label_that_the_set_does_not_have_is_said_to_be_unknown() -> None:
@@ -134,3 +148,27 @@ def test_doctor_names_a_directory_that_takes_no_recording() -> None:
     assert found["disk writes"][0] == "lacks"
     assert "choose a directory you can write" in found["disk writes"][2]
     assert done.returncode == 1
+
+
+def test_the_label_sets_are_listed_and_every_label_of_one_with_what_it_means() -> None:
+    sets = {row[0]: row[1:] for row in rows(shadebus("labels").stdout)}
+    assert sets["gnss_743a"][0] == "00B"
+    listed = {row[0]: row[1:] for row in rows(shadebus("labels", "--set", "gnss_743a").stdout)}
+    assert len(listed) == int(sets["gnss_743a"][1])
+    assert listed["110"][:6] == ["GNSS latitude", "bnr", "9-29", "180", "0.000171661377", "deg"]
+    assert listed["130"][2] == "12-28, satellite_failure 11"
+    assert listed["110"][7] == "200 to 1200"
+
+
+def test_a_set_that_there_is_not_is_named_with_those_there_are() -> None:
+    done = shadebus("labels", "--set", "gnss_744")
+    assert done.returncode == 1
+    assert "'gnss_744'" in done.stderr
+    assert "gnss_743a" in done.stderr
+
+
+def test_the_discrete_bits_of_a_word_are_explained_beside_its_value() -> None:
+    word = word429(0o130, {11: (1, 1), 12: (2**13, 17)}, ssm=3)
+    found = {row[0]: row[1:] for row in rows(shadebus("decode", "429", f"{word:08x}", "--set", "gnss_743a").stdout)}
+    assert found["satellite_failure"] == ["11", "1", "1"]
+    assert found["value"] == ["12-28", "1 NM", "NORMAL"]
