@@ -153,7 +153,7 @@ def test_doctor_names_a_directory_that_takes_no_recording() -> None:
 def test_the_label_sets_are_listed_and_every_label_of_one_with_what_it_means() -> None:
     sets = {row[0]: row[1:] for row in rows(shadebus("labels").stdout)}
     assert sets["gnss_743a"][0] == "00B"
-    listed = {row[0]: row[1:] for row in rows(shadebus("labels", "--set", "gnss_743a").stdout)}
+    listed = {row[0]: row[1:] for row in rows(shadebus("labels", "--set", "gnss_743a").stdout) if row[0]}
     assert len(listed) == int(sets["gnss_743a"][1])
     assert listed["110"][:6] == ["GNSS latitude", "bnr", "9-29", "180", "0.000171661377", "deg"]
     assert listed["130"][2] == "12-28, satellite_failure 11"
