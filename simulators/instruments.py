@@ -52,6 +52,12 @@ GNSS_LABELS = (*GNSS_COMPUTED, 0o130, 0o150, 0o140, 0o260, 0o273)
 RADIO_ALTITUDE = 0o164
 RADIO_ALTITUDE_INTERVAL_S = 0.040
 
+EQUIPMENT, EQUIPMENT_INTERVAL_S = 0o377, 1.0  # every box names itself
+
+BIT_FAULTS = {  # fault: (label, bit that turns over, and the parity with it)
+    "gnss_satellite_failure": (0o130, 11),
+    "gnss_acquisition": (0o273, 26),  # navigation, 011 in bits 28 to 26, becomes acquisition
+}
 STATUS_FAULTS = {  # fault: (labels, sign/status matrix)
     "gnss_no_computed_data": (GNSS_COMPUTED, NO_COMPUTED_DATA),
     "inertial_failure_warning": (tuple(INERTIAL_LABELS), FAILURE_WARNING),
@@ -92,7 +98,7 @@ def channels(settings: scenario.Scenario, trajectory: Trajectory, ground: Ground
             radio_altimeter(settings, trajectory, ground),
         ),
     )
-    return tuple(replace(channel, words=_with_faults(channel.words, settings.faults)) for channel in healthy)
+    return tuple(_with_faults(_announcing(channel), settings.faults) for channel in healthy)
 
 
 def inertial(settings: scenario.Scenario, trajectory: Trajectory) -> Source:
@@ -144,18 +150,32 @@ def _unless(good: NDArray[np.bool_], words: Words, ssm: int) -> Words:
     return np.where(good, words, without_data(words, ssm))
 
 
-def _with_faults(words: Source, faults: Sequence[scenario.Fault]) -> Source:
-    """The same source under the status faults of its labels."""
+def _announcing(channel: Channel) -> Channel:
+    """The same bus with the equipment label of its box."""
+
+    def words(label: int, time_s: Floats) -> Words:
+        if label == EQUIPMENT:
+            return encode_data(EQUIPMENT, np.full(len(time_s), channel.equipment))
+        return channel.words(label, time_s)
+
+    return replace(channel, words=words, intervals_s={**channel.intervals_s, EQUIPMENT: EQUIPMENT_INTERVAL_S})
+
+
+def _with_faults(channel: Channel, faults: Sequence[scenario.Fault]) -> Channel:
+    """The same bus under the faults of its labels."""
 
     def faulty(label: int, time_s: Floats) -> Words:
-        sent = words(label, time_s)
+        sent = channel.words(label, time_s)
         for fault in faults:
             labels, ssm = STATUS_FAULTS.get(fault.name, ((), BNR_NORMAL))
             if label in labels:
                 sent = _unless(~during(fault, time_s), sent, ssm)
+            turned, bit = BIT_FAULTS.get(fault.name, (None, 1))
+            if label == turned:
+                sent = np.where(during(fault, time_s), sent ^ np.uint32(1 << bit - 1 | 1 << 31), sent)
         return sent
 
-    return faulty
+    return replace(channel, words=faulty)
 
 
 def _track_words(measured: Truth, _: utc.Times) -> Words:

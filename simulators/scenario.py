@@ -102,7 +102,9 @@ class Fault(Settings):
 
     name: Literal[
         "gnss_no_computed_data",
+        "gnss_acquisition",
         "gnss_offset",
+        "gnss_satellite_failure",
         "heading_offset",
         "inertial_failure_warning",
         "radio_altitude_no_computed_data",

@@ -137,3 +137,20 @@ def test_below_seven_knots_the_track_is_not_computed() -> None:
     _, buses = fly(flight=slow)
     assert {ssm_of(word) for word in buses[2].words(0o103, SECONDS).tolist()} == {1}
     assert {ssm_of(word) for word in buses[2].words(0o112, SECONDS).tolist()} == {3}
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "bit"), [("gnss_satellite_failure", 0o130, 11), ("gnss_acquisition", 0o273, 26)]
+)
+def test_a_bit_fault_turns_its_bit_during_its_window_and_keeps_the_parity_odd(name: str, label: int, bit: int) -> None:
+    fault = scenario.Fault.model_validate({"name": name, "start_s": 3, "stop_s": 6})
+    (_, healthy), (_, faulty) = fly(), fly(faults=(fault,))
+    sent, turned = healthy[2].words(label, SECONDS), faulty[2].words(label, SECONDS)
+    assert (sent ^ turned).tolist() == [0] * 3 + [1 << bit - 1 | 1 << 31] * 3 + [0] * 4
+
+
+def test_every_box_names_itself_once_a_second() -> None:
+    _, buses = fly()
+    for channel, equipment in ((1, 0x004), (2, 0x00B), (3, 0x007)):
+        assert buses[channel].intervals_s[0o377] == 1.0
+        assert {word >> 10 & 0xFFF for word in buses[channel].words(0o377, SECONDS).tolist()} == {equipment}

@@ -17,9 +17,9 @@ DURATION_S = 12
 REFERENCE = scenario.white_mountains(duration_s=DURATION_S)
 SHORT = REFERENCE.model_copy(update={"radar": REFERENCE.radar.model_copy(update={"step_deg": 3.0})})
 INTERVALS_NS = {  # channel: {label: interval}
-    1: {0o310: 150, 0o311: 150, 0o312: 40, 0o313: 40, 0o314: 40, 0o324: 20, 0o325: 20, 0o361: 40},
-    2: dict.fromkeys((0o110, 0o120, 0o111, 0o121, 0o076, 0o112, 0o103, 0o130, 0o150, 0o140, 0o260, 0o273), 1000),
-    3: {0o164: 40},
+    1: {0o310: 150, 0o311: 150, 0o312: 40, 0o313: 40, 0o314: 40, 0o324: 20, 0o325: 20, 0o361: 40, 0o377: 1000},
+    2: dict.fromkeys((0o110, 0o120, 0o111, 0o121, 0o076, 0o112, 0o103, 0o130, 0o150, 0o140, 0o260, 0o273, 0o377), 1000),
+    3: {0o164: 40, 0o377: 1000},
 }
 
 
