@@ -32,6 +32,7 @@ def radials(
         data_accept=flags,
         scan_angle_deg=np.array(angles, float),
         bins=np.tile(np.arange(n, dtype=np.uint8)[:, None], bins),
+        unusual=flags,
     )
 
 
