@@ -93,7 +93,12 @@ def load_definitions(name_or_path: str | Path) -> Definitions:
     path = Path(name_or_path)
     if path.suffix != ".toml":
         return _named(str(name_or_path))
-    tables = _read(path)
+    return parse_definitions(_text(path), path)
+
+
+def parse_definitions(text: str, path: Path) -> Definitions:
+    """The one set of a TOML text; `path` names it in errors. Raises DefinitionError if a row is refused."""
+    tables = _tables(text, path)
     if len(tables) != 1:
         raise DefinitionError(f"{path} has {len(tables)} sets: put exactly one in a definition file")
     return _set(path, next(iter(tables)), tables)
@@ -105,16 +110,23 @@ def for_equipment(equipment_id_low_byte: int) -> str | None:
 
 
 def _named(name: str) -> Definitions:
-    tables = _read(LABELS_FILE)
+    tables = _tables(_text(LABELS_FILE), LABELS_FILE)
     if name not in tables:
         raise ValueError(f"no definitions {name!r}: name one of {', '.join(tables)} or a .toml file")
     return _set(LABELS_FILE, name, tables)
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        raise DefinitionError(f"{path} is no TOML: {error}") from error
+
+
+def _tables(text: str, path: Path) -> dict[str, Any]:
     # Decimal fractions are kept exact: 0.1 and 4.096 have no exact float.
     try:
-        return tomllib.loads(path.read_text("utf-8"), parse_float=Fraction)
+        return tomllib.loads(text, parse_float=Fraction)
     except tomllib.TOMLDecodeError as error:
         raise DefinitionError(f"{path} is no TOML: {error}") from error
 

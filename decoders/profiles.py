@@ -83,24 +83,24 @@ def load_profile(name_or_path: str | Path) -> Profile:
     """
     path = Path(name_or_path)
     if path.suffix == ".toml":
-        return parse_profile(_text(path), str(path))
+        return parse_profile(_text(path), path)
     return _named(str(name_or_path))
 
 
-def parse_profile(text: str, origin: str) -> Profile:
-    """The one profile of a TOML text; `origin` names it in errors. Raises ProfileError if it is refused."""
-    tables = _tables(text, origin)
+def parse_profile(text: str, path: Path) -> Profile:
+    """The one profile of a TOML text; `path` names it in errors. Raises ProfileError if it is refused."""
+    tables = _tables(text, path)
     if len(tables) != 1:
-        raise ProfileError(f"{origin} has {len(tables)} tables: put exactly one profile in a file")
+        raise ProfileError(f"{path} has {len(tables)} tables: put exactly one profile in a file")
     ((name, table),) = tables.items()
-    return _profile(origin, name, table)
+    return _profile(path, name, table)
 
 
 def _named(name: str) -> Profile:
-    tables = _tables(_text(PROFILES_FILE), PROFILES_FILE.name)
+    tables = _tables(_text(PROFILES_FILE), PROFILES_FILE)
     if name not in tables:
         raise ValueError(f"no profile {name!r}: use one of {', '.join(tables)}, or a .toml file")
-    return _profile(PROFILES_FILE.name, name, tables[name])
+    return _profile(PROFILES_FILE, name, tables[name])
 
 
 def _text(path: Path) -> str:
@@ -110,15 +110,15 @@ def _text(path: Path) -> str:
         raise ProfileError(f"{path} is no TOML: {error}") from error
 
 
-def _tables(text: str, origin: str) -> dict[str, Any]:
+def _tables(text: str, path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ProfileError(f"{origin} is no TOML: {error}") from error
+        raise ProfileError(f"{path} is no TOML: {error}") from error
 
 
-def _profile(origin: str, name: str, table: object) -> Profile:
-    where = f"{origin} [{name}]"
+def _profile(path: Path, name: str, table: object) -> Profile:
+    where = f"{path} [{name}]"
     if not isinstance(table, dict):
         raise ProfileError(f"{where}: a profile is a table of settings, not {table!r}")
     try:

@@ -6,8 +6,9 @@ from typing import ClassVar
 
 from decoders import formats as f
 from decoders.definitions import Definitions, for_equipment, load_definitions
+from decoders.profiles import Profile
 from decoders.racklink import ChannelCount, Framer, Hello, Packet
-from gateway.config import AdapterConfig
+from gateway.config import AdapterConfig, definitions_of, profile_of
 
 SEQUENCE_RANGE = 1 << 32
 FLAG_NAMES = {
@@ -40,7 +41,7 @@ class Channel429:
 class Channel708:
     """An ARINC 708 channel."""
 
-    profile: str
+    profile: Profile
     packet_type: ClassVar[int] = f.WORD_708
     role: ClassVar[str] = "radar"
 
@@ -50,7 +51,7 @@ class Link:
     """State of one bridge, kept over reconnections."""
 
     config: AdapterConfig
-    radar_profile: str
+    radar_profile: Profile
     framer: Framer = field(default_factory=Framer)
     counters: Counter[str] = field(default_factory=Counter)
     losses: Counter[str] = field(default_factory=Counter)  # since the last verdict
@@ -61,9 +62,11 @@ class Link:
     def __post_init__(self) -> None:
         for number, channel in self.config.channels.items():
             if channel.kind == "arinc708":
-                self.channels[number] = Channel708(channel.profile or self.radar_profile)
+                self.channels[number] = Channel708(
+                    profile_of(channel.profile) if channel.profile else self.radar_profile
+                )
             elif channel.definitions:
-                definitions = load_definitions(channel.definitions)
+                definitions = definitions_of(channel.definitions)
                 self.channels[number] = Channel429(definitions.equipment_id & 0xFF, definitions, channel.orientation)
 
     def succeed(self, before: "Link") -> None:
