@@ -12,7 +12,7 @@ import numpy as np
 from decoders import arinc429, arinc708
 from decoders import formats as f
 from decoders.racklink import MalformedBody, Packet, heartbeat, hello, radar_word, words429
-from gateway.config import RackConfig
+from gateway.config import RackConfig, profile_of
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
 from gateway.link import SPOILT, Channel429, Channel708, Link
 from gateway.records import Note, Raw, Record, Status, Tick
@@ -45,7 +45,8 @@ class Pipeline:
         self._config = config
         self._monitor = monitor
         self._watcher = watcher
-        self._links = {a.name: Link(a, config.radar_profile) for a in config.adapters}
+        profile = profile_of(config.radar_profile)
+        self._links = {a.name: Link(a, profile) for a in config.adapters}
         self._timebase = Timebase()
         self._aircraft = Aircraft()
         self._scans = ScanBuilder()
@@ -189,13 +190,19 @@ class Pipeline:
     def _radar(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         word = radar_word(packet)
         link.counters["words_708"] += 1
-        usable = word.bit_count == f.WORD_708_BITS and (yield from self._claim(link, packet, record))
         channel = link.channels.get(packet.channel)
+        whole = not isinstance(channel, Channel708) or word.bit_count == channel.profile.word_bits
+        if isinstance(channel, Channel708) and not whole:
+            link.counters["words_708_" + ("short" if word.bit_count < channel.profile.word_bits else "long")] += 1
+        usable = whole and (yield from self._claim(link, packet, record))
         if not usable or not isinstance(channel, Channel708):
             link.counters["words_708_unused"] += 1
             return
         yield from self._hear(RADAR, record)
         radials = arinc708.unpack(np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile)
+        for bit, name in enumerate(f.UNUSUAL_708):
+            if radials.unusual[0] >> bit & 1:
+                link.counters[f"words_708_{name}"] += 1
         offset_ns = yield from self._offset_ns(packet, record)
         for scan in self._scans.feed(np.array([packet.time_ns + offset_ns]), radials):
             yield from self._judge(scan, record)

@@ -138,11 +138,30 @@ def test_malformed_bodies_are_counted_and_cost_no_neighbour() -> None:
     assert found["bridge.words_708"] == 1
 
 
-def test_a_radar_word_of_another_length_is_counted_and_not_used() -> None:
+@pytest.mark.parametrize(
+    ("bits", "kind"), [(800, "short"), (0, "short"), (1599, "short"), (1601, "long"), (2047, "long")]
+)
+def test_a_radar_word_of_another_length_is_counted_by_kind_and_not_used(bits: int, kind: str) -> None:
     bridge, pipeline = Bridge(), Pipeline(RACK, None)
-    short = bridge.packet(f.WORD_708, RADAR, 0, (800).to_bytes(2, "little") + bytes(100))
-    feed(pipeline, raw(1, 0, bridge.hello() + short))
-    assert counters(pipeline)["bridge.words_708_unused"] == 1
+    word = bridge.packet(f.WORD_708, RADAR, 0, bits.to_bytes(2, "little") + bytes((bits + 7) // 8))
+    feed(pipeline, raw(1, 0, bridge.hello() + word))
+    found = {name: count for name, count in counters(pipeline).items() if name.startswith("bridge.words_708") and count}
+    assert found == {"bridge.words_708": 1, "bridge.words_708_unused": 1, f"bridge.words_708_{kind}": 1}
+
+
+def test_what_is_unusual_in_a_radar_word_is_counted_by_name_and_the_word_is_used() -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, None)
+    plain = radial(0)
+    odd = bytearray(arinc708.encode(BINS * 5, scan_angle_deg=3.0, tilt_deg=-2.0, range_nm=10.0, label=0o050, mode=7))
+    for bit in (11, 48, 63):
+        odd[bit // 8] |= 1 << bit % 8
+    words = bridge.radar(0.1, plain) + bridge.radar(0.2, bytes(odd)) + bridge.radar(0.3, plain)
+    feed(pipeline, raw(1, 0, bridge.hello() + words))
+    found = counters(pipeline)
+    names = ("unknown_label", "reserved_mode", "spare_11_12", "spare_48", "spare_63", "reserved_level")
+    assert names == f.UNUSUAL_708
+    assert [found[f"bridge.words_708_{name}"] for name in names] == [1] * 6
+    assert (found["bridge.words_708"], found.get("bridge.words_708_unused", 0)) == (3, 0)
 
 
 def test_a_chunk_of_an_adapter_that_is_not_configured_is_counted() -> None:
