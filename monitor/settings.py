@@ -41,6 +41,7 @@ class MonitorSettings(BaseModel):
         None, gt=0, description="ignore everything beyond; the range setting if not set"
     )
     lever_arm: LeverArm = LeverArm()
+    control_delay_s: float = Field(1.0, ge=0, le=60, description="what the radar may take to do what its panel asks")
 
     @property
     def pairs_needed(self) -> int:

@@ -8,7 +8,7 @@ from decoders.arinc429 import Status, decode
 from decoders.definitions import Definition, load_definitions
 from tests.decoders.bus import NORMAL_SSM, word429
 
-SETS = ["gnss_743", "gnss_743a", "iru_704", "adiru_738", "adc_706", "ra_707", "wxr_panel"]
+SETS = ["gnss_743", "gnss_743a", "iru_704", "adiru_738", "adc_706", "ra_707", "wxr_panel", "wxr_panel_divided_range"]
 ROWS = [(name, row) for name in SETS for row in load_definitions(name).labels.values()]
 BINARY_ROWS = [(name, row) for name, row in ROWS if row.encoding in ("bnr", "bnr_unsigned", "disc")]
 
