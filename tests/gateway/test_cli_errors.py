@@ -93,7 +93,7 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
         ("calibration file", "name: Field required"),
     ),
     "bad hexadecimal": (lambda d: ["decode", "429", "12g4"], ("12g4", "is not hexadecimal")),
-    "bad length": (lambda d: ["decode", "708", "b443"], ("2 bytes given, 8 or 200 needed",)),
+    "bad length": (lambda d: ["decode", "708", "b443"], ("2 bytes given, 8 to 256 needed",)),
     "unknown set": (lambda d: ["decode", "429", "1", "--set", "gps"], ("no definitions 'gps'", "gnss_743a")),
     "half a configuration": (lambda d: ["thresholds", "--n", "60"], ("give all of --n",)),
     "unknown outlet": (lambda d: ["simulate", "--to", "tin"], ("--to tin: use pty, tcp:PORT or file:PATH",)),
