@@ -237,6 +237,7 @@ class Pipeline:
             tilt_deg=scan.tilt_deg,
             gaps=scan.missing,
             repeated=scan.repeated,
+            cut_off=scan.cut_off,
         )
         if self._monitor is None:
             return

@@ -80,6 +80,7 @@ def test_a_sweep_becomes_a_scan_of_the_record_that_ended_it() -> None:
         tilt_deg=-2.0,
         gaps=0,
         repeated=0,
+        cut_off=0,
     )
 
 
