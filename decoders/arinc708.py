@@ -20,7 +20,7 @@ CODES: Final = np.arange(64)
 GAIN_DB: Final = np.where(f.GAIN_CALIBRATED == CODES, np.nan, CODES * f.GAIN_LSB_DB + 0.0)  # so that 0 is not -0
 RANGE_NM: Final = np.where(CODES == 0, f.RANGE_CODE_ZERO_NM, CODES * float(f.RANGE_LSB_NM))
 HALF_TURN: Final = 2048  # codes of the scan angle
-RESERVED: Final = "reserved"
+RESERVED: Final = "reserved"  # the name of a mode or level without a meaning
 NO_LEVEL: Final = 255
 ENOUGH_LIT: Final = 1000  # codes above zero, of which a scan over land has ten times as many
 CLEARLY: Final = 1.1  # noise alone gives 1; radars over land give 1.3 and more, one way or the other

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 from decoders import formats, layouts
 from decoders.arinc708 import Header, Radials, headers, load_profile, unpack
+from decoders.racklink import Framer
+from simulators import racklink
 from tests.decoders.bus import header708
 
 LABEL, MODE, SPARE_11, SPARE_48, SPARE_63, RESERVED_LEVEL = (1 << bit for bit in range(6))
@@ -122,13 +124,13 @@ def test_the_six_bit_profile_cuts_the_same_payload_into_256_bins() -> None:
     assert unpack(words(bytes(8)), "wxr2100_6bit").bins.tolist() == [[0o10, 0o32, 0o54, 0o76] * 64]
 
 
-def test_a_negative_tilt_is_twos_complement() -> None:
+def test_fault_a_tilt_of_minus_a_quarter_read_as_minus_1008() -> None:
     assert radial(tilt=127).tilt_deg[0] == -0.25
     assert radial(tilt=64).tilt_deg[0] == -16.0
     assert radial(tilt=63).tilt_deg[0] == 15.75
 
 
-def test_spare_bit_48_does_not_leak_into_the_range() -> None:
+def test_fault_spare_bit_48_leaks_into_the_range() -> None:
     assert radial(range=16, spare_48=1).range_nm[0] == radial(range=16).range_nm[0] == 80.0
     assert radial(range=0, spare_48=1).range_nm[0] == 320.0
 
@@ -153,20 +155,51 @@ def test_spare_bits_change_no_field_and_are_flagged(spare: dict[str, int], flag:
 
 
 @pytest.mark.parametrize("field", ["range", "gain", "mode", "label"])
-def test_no_code_of_a_field_drops_the_radial(field: str) -> None:
+def test_fault_a_code_that_is_not_listed_drops_the_radial(field: str) -> None:
     codes = range(2 ** formats.HEADER_708[field][1])
     radials = unpack(words(*(header708(**{field: code}) for code in codes)))
     assert all(len(column) == len(codes) for column in radials)
     np.testing.assert_array_equal(radials.bins, np.tile(np.arange(8), (len(codes), 64)))
 
 
-def test_a_payload_full_of_label_bytes_is_payload() -> None:
+def test_fault_a_payload_of_label_bytes_is_taken_for_headers() -> None:
     radials = unpack(words(header708(range=8), payload=b"\xb4" * 192))
     assert (radials.label.tolist(), radials.range_nm.tolist()) == ([0o055], [40.0])
     assert radials.bins[0, :8].tolist() == [0xB4B4B4 >> (3 * k) & 7 for k in range(8)]
 
 
-def test_a_word_with_another_label_is_kept() -> None:
+def test_fault_a_reader_synchronises_on_any_label_byte() -> None:
+    """Words in a damaged stream are found by the link's framing alone, whatever bytes they hold."""
+    whole = header708(range=8) + b"\xb4" * 192
+    packets = [racklink.encode(formats.WORD_708, 0, k, k, racklink.word_708(whole)) for k in range(6)]
+    framer = Framer()
+    found = framer.feed(
+        packets[0] + packets[1][:90] + packets[2] + b"\xb4" * 500 + packets[3] + packets[4][7:] + packets[5]
+    )
+    assert [packet.sequence for packet in found] == [0, 2, 3, 5]
+    assert all(packet.body[2:] == whole for packet in found)
+
+
+def test_fault_an_encoder_and_a_decoder_disagree_on_zero_and_sense_of_the_scan_angle() -> None:
+    """Sources differ, so it is a profile's setting: the same code is four angles."""
+    array = np.frombuffer(header708(scan_angle=512), np.uint8)[None]
+    settings: list[dict[str, Any]] = [
+        {"scan_angle_zero": zero, "scan_angle_sense": sense}
+        for zero in ("nose", "tail")
+        for sense in ("clockwise", "counterclockwise")
+    ]
+    angles = [headers(array, replace(load_profile("arinc708"), **change)).scan_angle_deg[0] for change in settings]
+    assert angles == [45.0, -45.0, -135.0, 135.0]
+
+
+def test_fault_the_order_of_the_faults_is_a_constant() -> None:
+    """Sources differ on it: the bits stay as sent, and the profile names them."""
+    assert [radial(faults=1 << bit).faults[0] for bit in range(7)] == [1 << bit for bit in range(7)]
+    turned = replace(load_profile("arinc708"), faults=load_profile("arinc708").faults[::-1])
+    assert turned.faults[0] == "transmit_receive"
+
+
+def test_fault_a_word_with_label_057_is_thrown_away() -> None:
     radials = unpack(words(bytes.fromhex("f443047a0e80767c")))
     assert (radials.label[0], radials.range_nm[0]) == (0o057, 160.0)
 
