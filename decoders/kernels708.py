@@ -62,7 +62,9 @@ def headers(words: Bytes, meanings: Meanings, header: Header) -> None:
         _code(bits, DATA_ACCEPT, header.data_accept[first:end])
         zero, sense = meanings.scan_angle_zero, meanings.scan_angle_sense
         _angle(bits, SCAN_ANGLE, zero, sense, SCAN_ANGLE_LSB_DEG, header.scan_angle_deg[first:end])
-        _unusual(bits, header.label[first:end], meanings, header.unusual[first:end])
+        _unusual(header.label[first:end], header.mode[first:end], meanings, header.unusual[first:end])
+        for k in range(len(SPARES)):
+            _spare(bits, SPARES[k], FIRST_SPARE + k, header.unusual[first:end])
 
 
 @njit(cache=True)
@@ -131,12 +133,15 @@ def _label(bits: Array, labels: Array) -> None:
 
 
 @njit(cache=True)
-def _unusual(bits: Array, labels: Array, meanings: Meanings, unusual: Array) -> None:
+def _unusual(labels: Array, modes: Array, meanings: Meanings, unusual: Array) -> None:
     for i in range(unusual.size):
-        flags = meanings.unusual_label[labels[i]] | meanings.unusual_mode[_field(bits[i], MODE)]
-        for k in range(len(SPARES)):
-            flags |= np.uint8(_field(bits[i], SPARES[k]) != 0) << (FIRST_SPARE + k)
-        unusual[i] = flags
+        unusual[i] = meanings.unusual_label[labels[i]] | meanings.unusual_mode[modes[i]]
+
+
+@njit(cache=True)
+def _spare(bits: Array, place: Place, flag: int, unusual: Array) -> None:
+    for i in range(unusual.size):
+        unusual[i] |= (_field(bits[i], place) != 0) << flag
 
 
 def _spread_32(_context: Any, width: Any, word: Any, byte: Any, bins: Any, first: Any, level: Any) -> Any:

@@ -9,8 +9,7 @@ from decoders import formats as f
 from decoders.definitions import DefinitionError, load_definitions
 from gateway.errors import GatewayError
 
-Row = tuple[str, str, str, str]
-Row708 = tuple[str, str, str, str, str, str]  # field, bits, code, value, unit, note
+Row = tuple[str, ...]  # field, bits, code, meaning; of a 708 word field, bits, code, value, unit, note
 
 
 def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]:
@@ -30,7 +29,7 @@ def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]
     status = arinc429.Status(int(values.status[0]))
     name = definition.name if definition else f"not in {definitions.name}"
     meaning = f.SSM_TABLES[definition.ssm][ssm] if definition else "depends on the label"
-    rows = [
+    rows: list[Row] = [
         ("label", "1-8", f"{label:03o}", name),
         ("SDI", "9-10", f"{int(parts.sdi[0]):02b}", "data" if definition and not definition.has_sdi else "source"),
         ("data", "11-29", f"{int(parts.data[0]):019b}", f"0x{int(parts.data[0]):05x}"),
@@ -42,7 +41,7 @@ def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]
     return rows
 
 
-def explain_708(text: str, profile_name: str) -> list[Row708]:
+def explain_708(text: str, profile_name: str) -> list[Row]:
     """Rows for one ARINC 708 word in hexadecimal; the header alone is enough, and bins need the whole word."""
     data = _bytes(text, range(f.HEADER_708_BYTES, f.LONGEST_WORD_708_BITS // 8 + 2))
     try:
@@ -58,7 +57,7 @@ def explain_708(text: str, profile_name: str) -> list[Row708]:
     codes = {name: bits >> first & (1 << width) - 1 for name, (first, width) in places}
     codes["label"] = int(header.label[0])  # the one field sent most significant bit first
     said = _values(header, codes, profile)
-    rows = [
+    rows: list[Row] = [
         (name, _span(first, width), f"{codes[name]:0{width}b}", *said[name], _note(name, codes[name], profile))
         for name, (first, width) in places
     ]
@@ -100,10 +99,12 @@ def _note(name: str, code: int, profile: arinc708.Profile) -> str:
     return "maximum" if name == "gain" and code == 0 else ""
 
 
-def _bins(radials: arinc708.Radials, payload: str, profile: arinc708.Profile) -> list[Row708]:
+def _bins(radials: arinc708.Radials, payload: str, profile: arinc708.Profile) -> list[Row]:
     """How many bins have each level that occurs, and how wide a bin is."""
     width_m = radials.range_nm[0] * 1852 / profile.bins
-    rows = [("bins", payload, "", str(profile.bins), "", f"of {profile.bits_per_bin} bits, {width_m:.1f} m each")]
+    rows: list[Row] = [
+        ("bins", payload, "", str(profile.bins), "", f"of {profile.bits_per_bin} bits, {width_m:.1f} m each")
+    ]
     for level, count in enumerate(np.bincount(radials.bins[0]).tolist()):
         name = profile.level_names[level]
         note = "UNUSUAL: a reserved code" if name == arinc708.RESERVED else ""

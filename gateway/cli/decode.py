@@ -1,6 +1,5 @@
 """`shadebus decode`: one word, explained field by field."""
 
-from collections.abc import Sequence
 from typing import Annotated
 
 import typer
@@ -30,7 +29,7 @@ def decode_708(
     _print(("field", "bits", "code", "value", "unit", "note"), explain_708(word, profile))
 
 
-def _print(columns: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
+def _print(columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
     from rich.box import MARKDOWN
     from rich.console import Console
     from rich.table import Table

@@ -1,6 +1,7 @@
 """Radials of ARINC 708 words: worked words, the declared layout, and one test for each fault of public decoders."""
 
 import math
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -382,3 +383,16 @@ def test_any_bytes_are_radials_within_the_bounds_of_their_fields(data: bytes, na
     assert np.all((found.range_nm >= 5) & (found.range_nm <= 320))
     assert np.all(np.isnan(found.gain_db) | (found.gain_db >= -62) & (found.gain_db <= 0))
     assert found.bins.max() < 2**profile.bits_per_bin
+
+
+@pytest.mark.parametrize("decode", [unpack, headers])
+def test_no_more_memory_is_taken_than_the_output_needs(
+    decode: Callable[[npt.NDArray[np.uint8]], Header | Radials],
+) -> None:
+    array = np.random.default_rng(2).integers(0, 256, (20_000, 200), np.uint8)
+    decode(array[:1])
+    tracemalloc.start()
+    found = decode(array)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < sum(getattr(found, name).nbytes for name in found._fields) + 50_000
