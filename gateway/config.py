@@ -35,6 +35,8 @@ class TomlFile(_Section):
 
 def _kept(name: object, info: ValidationInfo) -> object:
     """A path to a TOML file becomes the file; it counts from the rack file, the context's `base`."""
+    if not isinstance(name, str | dict | TomlFile):
+        raise ValueError("write a name, or the path of a .toml file")  # noqa: TRY004 # which pydantic would not tell
     if not isinstance(name, str) or not name.endswith(".toml"):
         return name
     path = (info.context or {}).get("base", Path()) / name

@@ -78,9 +78,9 @@ class ScanBuilder:
                 radials.bins.shape[1],
             )
             if self._rows:
-                broken = settings != self._settings or self._breaks(time, angle)
-                if broken or self._turns(angle):
-                    yield self._close(whole=not broken)
+                turned, broken = self._turns(angle), self._breaks(time, angle)
+                if turned or broken or settings != self._settings:
+                    yield self._close(whole=turned and not broken)
             self._settings = settings
             self._faults |= int(radials.faults[k])
             self._follow(time, angle)

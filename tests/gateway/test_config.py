@@ -52,6 +52,7 @@ def test_paths_count_from_where_the_rack_file_lies(tmp_path: Path) -> None:
             "no.toml cannot be read: No such",
         ),
         (ADAPTER + '[adapters.channels.0]\nkind = "arinc708"\nprofile = "x"', "profile: no profile 'x': use one of"),
+        ("radar_profile = 708\n" + ADAPTER, "radar_profile: write a name, or the path of a .toml file$"),
         ('radar_profile = "x"\n' + ADAPTER, "radar_profile: no profile 'x': use one of"),
         (ADAPTER + "[recording]\nsync_interval_s = 0", "recording.sync_interval_s: .*greater than 0"),
         (ADAPTER + "[monitor]\np_fa = 0.7", "monitor.p_fa: .*less than 0.5"),

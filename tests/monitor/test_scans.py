@@ -314,3 +314,10 @@ def test_a_sweep_across_the_tail_has_its_ends_beyond_180() -> None:
     scans = Sweeps().feed(radials([*around, *around[-2::-1], *around[1:]])).finish()
     assert sectors(scans) == [(170, 190), (-190, -175), (175, 190)]
     assert [scan.cut_off for scan in scans] == [0, 0, 0]
+
+
+def test_a_radar_that_changes_its_tilt_with_each_sweep_has_its_ends_compared_all_the_same() -> None:
+    sweeps = Sweeps()
+    for k, angles in enumerate([FULL, FULL, FULL[:-4], FULL, FULL]):
+        sweeps.feed(radials(angles, tilt_deg=float(k % 2)))
+    assert [scan.cut_off for scan in sweeps.finish()] == [0, 0, 4, 0, 0]
