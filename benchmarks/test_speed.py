@@ -1,6 +1,7 @@
 """Speed as ratios: each group holds the work and a rival that does the least any program could; read the (x.x)."""
 
 import struct
+import time
 import zlib
 from pathlib import Path
 
@@ -65,16 +66,61 @@ def test_framing_by_a_bare_loop_on_a_serial_line(benchmark: BenchmarkFixture, st
     assert benchmark(lambda: _bare_loop(pieces)) == PACKETS
 
 
-@pytest.mark.benchmark(group="708 words to bins, 10000 words")
+def radar_words(count: int) -> NDArray[np.uint8]:
+    return RNG.integers(0, 256, (count, 200), np.uint8)
+
+
+def spin(seconds: float) -> None:
+    """The rival where a limit is named: it lasts as long as the work may."""
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end:
+        pass
+
+
+@pytest.mark.benchmark(group="708 words to radials, 10000 words")
 def test_708_unpack(benchmark: BenchmarkFixture) -> None:
-    words = RNG.integers(0, 256, (10_000, 200), np.uint8)
+    words = radar_words(10_000)
     assert benchmark(lambda: arinc708.unpack(words)).bins.shape == (10_000, BINS)
 
 
-@pytest.mark.benchmark(group="708 words to bins, 10000 words")
-def test_copy_of_the_708_output(benchmark: BenchmarkFixture) -> None:
-    bins = RNG.integers(0, 8, (10_000, BINS), np.uint8)
+@pytest.mark.benchmark(group="708 words to radials, 10000 words")
+def test_copy_of_the_708_bins(benchmark: BenchmarkFixture) -> None:
+    bins = arinc708.unpack(radar_words(10_000)).bins
     assert benchmark(bins.copy).shape == bins.shape
+
+
+@pytest.mark.benchmark(group="708 words to radials, 100000 words")
+def test_708_unpack_beyond_the_caches(benchmark: BenchmarkFixture) -> None:
+    words = radar_words(100_000)
+    assert benchmark(lambda: arinc708.unpack(words)).bins.shape == (100_000, BINS)
+
+
+@pytest.mark.benchmark(group="708 words to radials, 100000 words")
+def test_copy_of_the_708_bins_beyond_the_caches(benchmark: BenchmarkFixture) -> None:
+    bins = arinc708.unpack(radar_words(100_000)).bins
+    assert benchmark(bins.copy).shape == bins.shape
+
+
+@pytest.mark.benchmark(group="708 headers, 100000 words")
+def test_708_headers(benchmark: BenchmarkFixture) -> None:
+    words = radar_words(100_000)
+    assert len(benchmark(lambda: arinc708.headers(words)).label) == len(words)
+
+
+@pytest.mark.benchmark(group="708 headers, 100000 words")
+def test_limit_of_20_million_headers_a_second(benchmark: BenchmarkFixture) -> None:
+    benchmark(lambda: spin(100_000 / 20e6))
+
+
+@pytest.mark.benchmark(group="708 words of one packet or read, 30 words")
+def test_708_unpack_live(benchmark: BenchmarkFixture) -> None:
+    words = radar_words(30)
+    assert len(benchmark(lambda: arinc708.unpack(words)).bins) == len(words)
+
+
+@pytest.mark.benchmark(group="708 words of one packet or read, 30 words")
+def test_limit_of_30_us_a_call(benchmark: BenchmarkFixture) -> None:
+    benchmark(lambda: spin(30e-6))
 
 
 @pytest.fixture(scope="module")

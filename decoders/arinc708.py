@@ -3,43 +3,27 @@
 Every word of the right length becomes a radial, whatever its label, range or gain code: nothing is dropped here.
 """
 
-from typing import Any, Final, NamedTuple
+from functools import cache
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from decoders import formats as f
 from decoders import kernels708
-from decoders.profiles import Profile, load_profile
+from decoders.profiles import Profile, ProfileError, load_profile
+from decoders.results708 import Header, Meanings, Radials
 
-__all__ = ["Profile", "Radials", "load_profile", "misread_bits", "unpack"]
+__all__ = ["Header", "Profile", "ProfileError", "Radials", "headers", "load_profile", "misread_bits", "unpack"]
 
-HEADER_FIELDS: Final = np.array(list(f.HEADER_708.values()), np.int64)
-# The label alone is sent most significant bit first.
-REVERSED: Final = np.array([int(f"{byte:08b}"[::-1], 2) for byte in range(256)], np.uint8)
 CODES: Final = np.arange(64)
-GAIN_DB: Final = np.where(f.GAIN_CALIBRATED == CODES, np.nan, np.abs(CODES) * f.GAIN_LSB_DB + 0.0)
+GAIN_DB: Final = np.where(f.GAIN_CALIBRATED == CODES, np.nan, CODES * f.GAIN_LSB_DB + 0.0)  # so that 0 is not -0
+RANGE_NM: Final = np.where(CODES == 0, f.RANGE_CODE_ZERO_NM, CODES * float(f.RANGE_LSB_NM))
+HALF_TURN: Final = 2048  # codes of the scan angle
+RESERVED: Final = "reserved"  # the name of a mode or level without a meaning
+NO_LEVEL: Final = 255
 ENOUGH_LIT: Final = 1000  # codes above zero, of which a scan over land has ten times as many
 CLEARLY: Final = 1.1  # noise alone gives 1; radars over land give 1.3 and more, one way or the other
-RANGE_NM: Final = np.where(CODES == 0, f.RANGE_CODE_ZERO_NM, CODES * float(f.RANGE_LSB_NM))
-
-
-class Radials(NamedTuple):
-    """n radials. ARINC 708 header bits in brackets, bit 0 the first on the wire; all fields but `bins` are (n,)."""
-
-    label: npt.NDArray[np.uint8]  # conventional: 0o055 for a radar [0-7]
-    control_accept: npt.NDArray[np.uint8]  # 0 none, 1, 2, 3 both indicators [8-9]
-    slave: npt.NDArray[np.bool_]  # [10]
-    annunciations: npt.NDArray[np.uint8]  # bit 13 is 1, named in `formats.ANNUNCIATIONS_708` [13-17]
-    faults: npt.NDArray[np.uint8]  # bit 18 is 1, named by the profile [18-24]
-    stabilised: npt.NDArray[np.bool_]  # [25]
-    mode: npt.NDArray[np.uint8]  # code, named by the profile [26-28]
-    tilt_deg: npt.NDArray[np.float64]  # -16 to 15.75, up positive [29-35]
-    gain_db: npt.NDArray[np.float64]  # 0 maximum, nan calibrated, else negative [36-41]
-    range_nm: npt.NDArray[np.float64]  # 5 to 320 [42-47]
-    data_accept: npt.NDArray[np.uint8]  # 0 none, 1, 2, 3 any [49-50]
-    scan_angle_deg: npt.NDArray[np.float64]  # [-180, 180) from the nose, clockwise positive [51-62]
-    bins: npt.NDArray[np.uint8]  # (n, M), nearest first, 3 or 6 bits each
 
 
 def unpack(words: npt.ArrayLike, profile: str | Profile = "arinc708") -> Radials:
@@ -48,11 +32,27 @@ def unpack(words: npt.ArrayLike, profile: str | Profile = "arinc708") -> Radials
     Raises ValueError for words that are no bytes or not of the profile's length (200), and for an unknown profile.
     """
     settings = load_profile(profile) if isinstance(profile, str) else profile
-    array = _words(words, settings)
-    codes = np.empty((len(f.HEADER_708), array.shape[0]), np.uint16)
-    bins = np.empty((array.shape[0], settings.bins), np.uint8)
-    kernels708.unpack(array, HEADER_FIELDS, settings.bits_per_bin, codes, bins)
-    return _radials(dict(zip(f.HEADER_708, codes, strict=True)), bins, settings)
+    array = _words(words)
+    if array.shape[1] != settings.word_bytes:
+        raise ValueError(
+            f"words of shape {array.shape}: profile {settings.name} takes (n, {settings.word_bytes}) bytes"
+            f" ({settings.word_bits} bits a word)"
+        )
+    meanings, reserved_levels = _meanings(settings)
+    header = _headers(array, meanings)
+    bins = np.empty((len(array), settings.bins), np.uint8)
+    for level in reserved_levels:
+        kernels708.unpack_bins(array, settings.bits_per_bin, level, bins, header.unusual)
+    return Radials(*header[:-1], bins, header.unusual)
+
+
+def headers(words: npt.ArrayLike, profile: str | Profile = "arinc708") -> Header:
+    """The header fields of words (n, bytes) u1 of any length from 8 bytes, such as short words and headers alone.
+
+    Raises ValueError for words that are no bytes or shorter, and for an unknown profile.
+    """
+    settings = load_profile(profile) if isinstance(profile, str) else profile
+    return _headers(_words(words), _meanings(settings)[0])
 
 
 def misread_bits(bins: npt.NDArray[np.uint8]) -> int | None:
@@ -73,42 +73,38 @@ def misread_bits(bins: npt.NDArray[np.uint8]) -> int | None:
     return 3 if one_after > CLEARLY * next_one else None
 
 
-def _radials(code: dict[str, npt.NDArray[np.uint16]], bins: npt.NDArray[np.uint8], settings: Profile) -> Radials:
-    return Radials(
-        label=REVERSED[code["label"]],
-        control_accept=code["control_accept"].astype(np.uint8),
-        slave=code["slave"].astype(np.bool_),
-        annunciations=code["annunciations"].astype(np.uint8),
-        faults=code["faults"].astype(np.uint8),
-        stabilised=code["stabilised"].astype(np.bool_),
-        mode=code["mode"].astype(np.uint8),
-        tilt_deg=_signed(code["tilt"], 7) * f.TILT_LSB_DEG,
-        gain_db=GAIN_DB[code["gain"]],
-        range_nm=RANGE_NM[code["range"]],
-        data_accept=code["data_accept"].astype(np.uint8),
-        scan_angle_deg=_scan_angle(code["scan_angle"], settings),
-        bins=bins,
+def _headers(array: npt.NDArray[np.uint8], meanings: Meanings) -> Header:
+    header = Header.empty(len(array))
+    kernels708.headers(array, meanings, header)
+    return header
+
+
+@cache
+def _meanings(settings: Profile) -> tuple[Meanings, list[int]]:
+    """What the kernels need of a profile: tables, and the levels to flag, or one that no bin has."""
+    meanings = Meanings(
+        gain_db=GAIN_DB,
+        range_nm=RANGE_NM,
+        unusual_label=_flagged("unknown_label", ~np.isin(np.arange(256), settings.labels)),
+        unusual_mode=_flagged("reserved_mode", np.array(settings.modes) == RESERVED),
+        scan_angle_zero=HALF_TURN if settings.scan_angle_zero == "tail" else 0,
+        scan_angle_sense=1 if settings.scan_angle_sense == "clockwise" else -1,
     )
+    reserved = [level for level, name in enumerate(settings.levels) if name == RESERVED]
+    return meanings, reserved or [NO_LEVEL]
 
 
-def _scan_angle(code: npt.NDArray[np.uint16], settings: Profile) -> npt.NDArray[np.float64]:
-    # Half a turn, 2048 codes, lies between nose and tail; the sum is cut to 12 bits again.
-    zero = 2048 if settings.scan_angle_zero == "tail" else 0
-    return _signed((code + zero) & 0xFFF, 12) * f.SCAN_ANGLE_LSB_DEG
+def _flagged(name: str, unusual: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+    return np.where(unusual, np.uint8(1 << f.UNUSUAL_708.index(name)), np.uint8(0))
 
 
-def _signed(code: npt.NDArray[np.integer[Any]], width: int) -> npt.NDArray[np.float64]:
-    return np.where(code >> (width - 1), code - 2.0**width, code)
-
-
-def _words(words: npt.ArrayLike, settings: Profile) -> npt.NDArray[np.uint8]:
+def _words(words: npt.ArrayLike) -> npt.NDArray[np.uint8]:
     array = np.asarray(words)
-    if array.ndim != 2 or array.shape[1] != settings.word_bytes:
+    if array.ndim != 2 or array.shape[1] < f.HEADER_708_BYTES:
         raise ValueError(
-            f"words of shape {array.shape}: profile {settings.name} takes (n, {settings.word_bytes}) bytes"
-            f" ({settings.word_bytes * 8} bits a word)"
+            f"words of shape {array.shape}: pass (n, bytes), at least the {f.HEADER_708_BYTES} of a header"
         )
     if array.dtype != np.uint8:
         raise ValueError(f"words of type {array.dtype}: pass bytes, uint8")
-    # One memory layout, so that the kernel is compiled once.
+    # One memory layout, so that the kernels are compiled once.
     return np.require(array, np.uint8, ["C", "A", "W"])

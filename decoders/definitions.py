@@ -111,7 +111,12 @@ def load_definitions(name_or_path: str | Path) -> Definitions:
     path = Path(name_or_path)
     if path.suffix != ".toml":
         return _named(str(name_or_path))
-    file = _read(path)
+    return parse_definitions(_text(path), path)
+
+
+def parse_definitions(text: str, path: Path) -> Definitions:
+    """The one set of a TOML text; `path` names it in errors. Raises DefinitionError if a row is refused."""
+    file = _file(text, path)
     if len(file.tables) != 1:
         raise DefinitionError(f"{path} has {len(file.tables)} sets: put exactly one in a definition file")
     return _set(file, next(iter(file.tables)))
@@ -145,7 +150,7 @@ class _File(NamedTuple):
 
 @cache
 def _built_in() -> _File:
-    file = _read(LABELS_FILE)
+    file = _file(_text(LABELS_FILE), LABELS_FILE)
     defined: dict[tuple[int, str], str] = {}
     for name, table in file.tables.items():
         for row in [] if "extends" in table else table["rows"]:
@@ -163,8 +168,14 @@ def _named(name: str) -> Definitions:
     return _set(file, name)
 
 
-def _read(path: Path) -> _File:
-    text = path.read_text("utf-8")
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        raise DefinitionError(f"{path} is no TOML: {error}") from error
+
+
+def _file(text: str, path: Path) -> _File:
     # Decimal fractions are kept exact: 0.1 and 4.096 have no exact float.
     try:
         return _File(path, tomllib.loads(text, parse_float=Fraction), text)
@@ -201,7 +212,7 @@ def _definition(where: str, row: dict[str, Any]) -> Definition:
     _check_keys(where, row, encoding)
     try:
         definition = Definition(
-            label=int(row["label"], 8),
+            label=_label(row["label"]),
             name=row["name"],
             encoding=row["encoding"],
             bits=_bits(row["bits"]) if "bits" in row else encoding.bits,
@@ -213,13 +224,19 @@ def _definition(where: str, row: dict[str, Any]) -> Definition:
             source=row["source"],
             confidence=row["confidence"],
             positive=row.get("positive", ""),
-            fine_of=int(row["fine_of"], 8) if "fine_of" in row else None,
+            fine_of=_label(row["fine_of"]) if "fine_of" in row else None,
             interval_ms=_interval(row["interval_ms"]) if "interval_ms" in row else None,
         )
     except (AttributeError, TypeError, ValueError, ZeroDivisionError) as error:
         raise DefinitionError(f"{where}: {error}") from error
     _check(where, definition)
     return definition
+
+
+def _label(text: str) -> int:
+    if not re.fullmatch("[0-3]?[0-7]{1,2}", text):
+        raise ValueError(f"{text!r} is no label: write it in octal, '000' to '377'")
+    return int(text, 8)
 
 
 def _bits(bits: int | list[int]) -> tuple[int, int]:
@@ -256,8 +273,6 @@ def _check_keys(where: str, row: dict[str, Any], encoding: Encoding) -> None:
 def _check(where: str, definition: Definition) -> None:
     first, last = definition.bits
     width = last - first + 1
-    if not 0 <= definition.label <= 0o377:
-        raise DefinitionError(f"{where}: a label is octal 000 to 377")
     if definition.ssm not in SSM_TABLES:
         raise DefinitionError(f"{where}: unknown ssm {definition.ssm!r}, use one of {', '.join(SSM_TABLES)}")
     if definition.encoding == "iso5" and width % CHARACTER_BITS:

@@ -67,6 +67,7 @@ WORD_708_BITS: Final = 1600
 WORD_708_BYTES: Final = 200
 HEADER_708_BYTES: Final = 8
 WORD_708_US: Final = 1606  # 1600 bits at 1 Mbit/s and two syncs of 3 us
+LONGEST_WORD_708_BITS: Final = 2047  # that receiving cards take
 LABEL_708: Final = 0o055
 
 # Header field -> first bit (bit 0 is the first on the wire), width. Only the label is sent most significant bit first.
@@ -84,6 +85,10 @@ HEADER_708: Final = {
     "data_accept": (49, 2),
     "scan_angle": (51, 12),
 }
+# Bits without a meaning, as in HEADER_708.
+SPARE_708: Final = {"spare_11_12": (11, 2), "spare_48": (48, 1), "spare_63": (63, 1)}
+# What a radial can have that its profile does not expect, the first name the lowest bit of `unusual`.
+UNUSUAL_708: Final = ("unknown_label", "reserved_mode", *SPARE_708, "reserved_level")
 ANNUNCIATIONS_708: Final = ("turbulence_alert", "weather_alert", "anti_clutter", "sector_scan", "beyond_limits")
 MODES_708: Final = {
     "standby": 0,

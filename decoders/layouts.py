@@ -20,7 +20,6 @@ from construct import (
     Int16ul,
     Int32ul,
     Int64ul,
-    Padding,
     Struct,
     Terminated,
     this,
@@ -69,7 +68,7 @@ RADAR_HEADER = BitsSwapped(
         "label" / BitsInteger(8),
         "control_accept" / _lsb_first(2),
         "slave" / Flag,
-        Padding(2),
+        "spare_11_12" / _lsb_first(2),
         "annunciations" / _lsb_first(5),
         "faults" / _lsb_first(7),
         "stabilised" / Flag,
@@ -77,9 +76,9 @@ RADAR_HEADER = BitsSwapped(
         "tilt" / _lsb_first(7),
         "gain" / _lsb_first(6),
         "range" / _lsb_first(6),
-        "spare_48" / Flag,
+        "spare_48" / _lsb_first(1),
         "data_accept" / _lsb_first(2),
         "scan_angle" / _lsb_first(12),
-        Padding(1),
+        "spare_63" / _lsb_first(1),
     )
 )

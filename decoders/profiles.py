@@ -1,56 +1,149 @@
-"""Radar profiles: what differs between radars that speak ARINC 708, read from `profiles.toml`."""
+"""Radar profiles: what differs between radars that speak ARINC 708, read from TOML and checked."""
 
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal, Self
 
-from decoders.formats import HEADER_708_BYTES
+from pydantic import ConfigDict, Field, ValidationError, model_validator
+from pydantic.dataclasses import dataclass
 
+from decoders.formats import HEADER_708_BYTES, LONGEST_WORD_708_BITS
+
+HEADER_BITS: Final = 8 * HEADER_708_BYTES
 PROFILES_FILE: Final = Path(__file__).with_name("profiles.toml")
-GROUP_BITS: Final = 24  # three payload bytes hold a whole number of bins
+BINS_AT_ONCE: Final = 32  # a kernel unpacks so many in one go
+
+Label = Annotated[int, Field(ge=0, le=0o377)]
+Colour = Annotated[str, Field(pattern=r"^#[0-9a-f]{6}$")]
 
 
-@dataclass(frozen=True, slots=True)
+class ProfileError(ValueError):
+    """A profile that no radar can have; the message names the file, the profile and the key."""
+
+
+@dataclass(frozen=True, slots=True, config=ConfigDict(extra="forbid"))
 class Profile:
-    """Settings of one radar; `dataclasses.replace` makes a variant.
+    """Settings of one radar; `profiles.toml` explains them. `dataclasses.replace` makes a variant.
 
-    Raises ValueError for settings that no word can have.
+    Raises pydantic's ValidationError, a ValueError, for settings that no word can have.
     """
 
     name: str
-    bins: int
-    bits_per_bin: int  # 3 or 6
-    scan_angle_zero: str  # "nose" or "tail"
-    faults: tuple[str, ...]  # header bits 18 to 24
-    modes: tuple[str, ...]  # codes 0 to 7
+    word_bits: Annotated[int, Field(le=LONGEST_WORD_708_BITS)]
+    bins: Annotated[int, Field(ge=BINS_AT_ONCE, multiple_of=BINS_AT_ONCE)]
+    bits_per_bin: Literal[3, 6]
+    labels: tuple[Label, ...]
+    scan_angle_zero: Literal["nose", "tail"]
+    scan_angle_sense: Literal["clockwise", "counterclockwise"]
+    faults: Annotated[tuple[str, ...], Field(min_length=7, max_length=7)]
+    modes: Annotated[tuple[str, ...], Field(min_length=8, max_length=8)]
+    levels: tuple[str, ...]
+    colours: Annotated[tuple[Colour, ...], Field(min_length=2)]
 
-    def __post_init__(self) -> None:
-        if self.bits_per_bin not in (3, 6) or self.bins * self.bits_per_bin % GROUP_BITS:
-            raise ValueError(f"profile {self.name}: bins are 3 or 6 bits, and whole in {GROUP_BITS} bits")
-        if self.scan_angle_zero not in ("nose", "tail"):
-            raise ValueError(f"profile {self.name}: scan_angle_zero is nose or tail, not {self.scan_angle_zero!r}")
-        if (len(self.faults), len(self.modes)) != (7, 8):
-            raise ValueError(f"profile {self.name}: name 7 faults and 8 modes")
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if self.word_bits != HEADER_BITS + self.bins * self.bits_per_bin:
+            raise ValueError(
+                f"word_bits is {self.word_bits}, but a header of {HEADER_BITS} bits and"
+                f" {self.bins} bins of {self.bits_per_bin} are {HEADER_BITS + self.bins * self.bits_per_bin}"
+            )
+        if len(self.levels) not in (0, 2**self.bits_per_bin):
+            raise ValueError(f"levels: name all {2**self.bits_per_bin} or none, not {len(self.levels)}")
+        if len(self.colours) > 2**self.bits_per_bin:
+            raise ValueError(f"colours: {len(self.colours)} are more than the {2**self.bits_per_bin} levels")
+        return self
 
     @property
     def word_bytes(self) -> int:
         """Length of a word, header included."""
-        return HEADER_708_BYTES + self.bins * self.bits_per_bin // 8
+        return self.word_bits // 8
 
+    @property
+    def level_names(self) -> tuple[str, ...]:
+        """What each level is called; a level without a public name is called by its number."""
+        return self.levels or tuple(f"level {level}" for level in range(2**self.bits_per_bin))
 
-def load_profile(name: str) -> Profile:
-    """The profile "arinc708", "arinc708a" or "wxr2100_6bit". Raises ValueError for another name."""
-    if name not in _profiles():
-        raise ValueError(f"no profile {name!r}: use one of {', '.join(_profiles())}")
-    return _profiles()[name]
+    @property
+    def palette(self) -> tuple[str, ...]:
+        """The colour of each level as #rrggbb, blended between `colours`, which lie evenly over the levels."""
+        last = 2**self.bits_per_bin - 1
+        return tuple(_blend(self.colours, level * (len(self.colours) - 1) / last) for level in range(last + 1))
 
 
 @cache
-def _profiles() -> dict[str, Profile]:
-    return {name: _profile(name, table) for name, table in tomllib.loads(PROFILES_FILE.read_text("utf-8")).items()}
+def load_profile(name_or_path: str | Path) -> Profile:
+    """The profile "arinc708", "arinc708a" or "wxr2100_6bit", or the one profile of a TOML file of the same form.
+
+    A profile that `extends` a named one has its settings too, except those it gives itself. It is read once a process.
+
+    Raises ProfileError if it is refused, ValueError for an unknown name, OSError if the file cannot be read.
+    """
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        return parse_profile(_text(path), path)
+    return _named(str(name_or_path))
 
 
-def _profile(name: str, table: dict[str, Any]) -> Profile:
-    return Profile(name, **table | {"faults": tuple(table["faults"]), "modes": tuple(table["modes"])})
+def parse_profile(text: str, path: Path) -> Profile:
+    """The one profile of a TOML text; `path` names it in errors. Raises ProfileError if it is refused."""
+    tables = _tables(text, path)
+    if len(tables) != 1:
+        raise ProfileError(f"{path} has {len(tables)} tables: put exactly one profile in a file")
+    ((name, table),) = tables.items()
+    return _profile(path, name, table)
+
+
+def _named(name: str) -> Profile:
+    tables = _tables(_text(PROFILES_FILE), PROFILES_FILE)
+    if name not in tables:
+        raise ValueError(f"no profile {name!r}: use one of {', '.join(tables)}, or a .toml file")
+    return _profile(PROFILES_FILE, name, tables[name])
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        raise ProfileError(f"{path} is no TOML: {error}") from error
+
+
+def _tables(text: str, path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ProfileError(f"{path} is no TOML: {error}") from error
+
+
+def _profile(path: Path, name: str, table: object) -> Profile:
+    where = f"{path} [{name}]"
+    if not isinstance(table, dict):
+        raise ProfileError(f"{where}: a profile is a table of settings, not {table!r}")
+    try:
+        return Profile(**_inherited(where, table) | {"name": name})
+    except ValidationError as error:
+        raise ProfileError("; ".join(f"{where} {_complaint(problem)}" for problem in error.errors())) from error
+
+
+def _inherited(where: str, table: dict[str, Any]) -> dict[str, Any]:
+    if "extends" not in table:
+        return table
+    try:
+        base = asdict(_named(str(table["extends"])))
+    except ValueError as error:
+        raise ProfileError(f"{where} extends: {error}") from error
+    return base | {key: value for key, value in table.items() if key != "extends"}
+
+
+def _complaint(problem: Mapping[str, Any]) -> str:
+    key = " ".join(str(part) for part in problem["loc"])
+    return f"{key}: {problem['msg']}".removeprefix(": ").replace("Value error, ", "")
+
+
+def _blend(colours: tuple[str, ...], at: float) -> str:
+    """The colour `at` steps along a row of colours."""
+    first = min(int(at), len(colours) - 2)
+    near, far = (bytes.fromhex(colour[1:]) for colour in colours[first : first + 2])
+    return "#" + bytes(round(a + (b - a) * (at - first)) for a, b in zip(near, far, strict=True)).hex()

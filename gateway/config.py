@@ -2,13 +2,23 @@
 
 import re
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 
-from decoders.definitions import load_definitions
-from decoders.profiles import load_profile
+from decoders.definitions import Definitions, load_definitions, parse_definitions
+from decoders.profiles import Profile, load_profile, parse_profile
 from gateway.errors import GatewayError
 from monitor.settings import MonitorSettings
 
@@ -17,21 +27,49 @@ class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def _known_definitions(name: str) -> str:
+class TomlFile(_Section):
+    """A file of the user's own, kept with its text: a recording replays without the file."""
+
+    path: Path
+    text: str
+
+
+def _kept(name: object, info: ValidationInfo) -> object:
+    """A path to a TOML file becomes the file; it counts from the rack file, the context's `base`."""
+    if not isinstance(name, str | dict | TomlFile):
+        raise ValueError("write a name, or the path of a .toml file")  # noqa: TRY004 # which pydantic would not tell
+    if not isinstance(name, str) or not name.endswith(".toml"):
+        return name
+    path = (info.context or {}).get("base", Path()) / name
     try:
-        load_definitions(name)
+        return TomlFile(path=path, text=path.read_text("utf-8"))
     except OSError as error:
-        raise ValueError(f"definitions {name} cannot be read: {error.strerror}") from error
-    return name
+        raise ValueError(f"{path} cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path} is no TOML: {error}") from error
 
 
-def _known_profile(name: str) -> str:
-    load_profile(name)
-    return name
+def definitions_of(source: str | TomlFile) -> Definitions:
+    """The label set that a channel names. Raises ValueError for an unknown name or a set that is refused."""
+    return load_definitions(source) if isinstance(source, str) else parse_definitions(source.text, source.path)
 
 
-DefinitionsName = Annotated[str, AfterValidator(_known_definitions)]
-ProfileName = Annotated[str, AfterValidator(_known_profile)]
+def profile_of(source: str | TomlFile) -> Profile:
+    """The radar profile that a channel names. Raises ValueError for an unknown name or a profile that is refused."""
+    return load_profile(source) if isinstance(source, str) else parse_profile(source.text, source.path)
+
+
+def _checked(load: Callable[[str | TomlFile], object]) -> AfterValidator:
+    def check(source: str | TomlFile) -> str | TomlFile:
+        load(source)
+        return source
+
+    return AfterValidator(check)
+
+
+Source = Annotated[str | TomlFile, BeforeValidator(_kept)]
+DefinitionsSource = Annotated[Source, _checked(definitions_of)]
+ProfileSource = Annotated[Source, _checked(profile_of)]
 ChannelNumber = Annotated[int, Field(ge=0, le=255)]  # one byte of a packet
 
 
@@ -49,9 +87,9 @@ class ChannelConfig(_Section):
     """What a channel of a bridge carries, where its hello packet does not say so or says too little."""
 
     kind: Literal["arinc429", "arinc708"]
-    definitions: DefinitionsName | None = Field(None, description="label set by name, or a TOML file of one")
+    definitions: DefinitionsSource | None = Field(None, description="label set by name, or a TOML file of one")
     orientation: Literal["wire", "label_swapped"] = "wire"
-    profile: ProfileName | None = Field(None, description="ARINC 708 profile")
+    profile: ProfileSource | None = Field(None, description="ARINC 708 profile by name, or a TOML file of one")
     join_rule: Literal["concatenate", "toward_zero"] = Field(
         "concatenate", description="how fine position words join coarse ones in the south and west"
     )
@@ -86,7 +124,7 @@ class RackConfig(_Section):
     recording: RecordingConfig | None = None
     terrain: tuple[Path, ...] = Field((), description="GeoTIFF, HGT or DTED files")
     calibration: Path | None = Field(None, description="calibration file of the radar; stated defaults without")
-    radar_profile: ProfileName = Field("arinc708", description="ARINC 708 profile of radar channels that name none")
+    radar_profile: ProfileSource = Field("arinc708", description="ARINC 708 profile of radar channels that name none")
     monitor: MonitorSettings = MonitorSettings()
     wait_for_devices: bool = Field(False, description="start although a device is not there yet, and keep trying")
 
@@ -112,8 +150,8 @@ def load_config(path: Path) -> RackConfig:
         raise GatewayError(f"cannot read configuration {path}: {error.strerror}") from error
     except ValueError as error:  # not TOML, or not even text
         raise GatewayError(f"configuration {path} is not TOML: {error}") from error
-    config = check_config(table, str(path))
     base = path.absolute().parent
+    config = check_config(table, str(path), base)
     recording = config.recording and config.recording.model_copy(
         update={"directory": base / config.recording.directory}
     )
@@ -125,10 +163,13 @@ def load_config(path: Path) -> RackConfig:
     return config.model_copy(update=changes)
 
 
-def check_config(table: dict[str, object], origin: str) -> RackConfig:
-    """A rack configuration from its table, with paths as they stand. Raises GatewayError naming origin and key."""
+def check_config(table: dict[str, object], origin: str, base: Path = Path()) -> RackConfig:
+    """A rack configuration from its table, its TOML files read from `base`, other paths as they stand.
+
+    Raises GatewayError naming origin and key.
+    """
     try:
-        return RackConfig.model_validate(table)
+        return RackConfig.model_validate(table, context={"base": base})
     except ValidationError as error:
         problems = "; ".join(
             f"{'.'.join(str(part) for part in problem['loc']) or 'the whole'}: {problem['msg']}"

@@ -27,6 +27,7 @@ def describe(event: Event) -> str:
     if isinstance(event, ScanEvent):
         low, high = event.sector
         gaps = f", {event.gaps} missing" if event.gaps else ""
+        gaps += f", {event.cut_off} cut off" if event.cut_off else ""
         return f"scan {event.scan}: {event.radials} radials{gaps}, {low:+.0f} to {high:+.0f} deg, {event.range_nm:g} NM"
     if isinstance(event, IntegrityEvent):
         reasons = "; ".join(event.reasons)

@@ -42,6 +42,7 @@ class ScanEvent(Event):
     tilt_deg: float
     gaps: int
     repeated: int
+    cut_off: int  # at its ends, against the sweep before
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """One bus word as rows of a table: field, bits, code, meaning."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,7 +10,7 @@ from decoders import formats as f
 from decoders.definitions import Definition, DefinitionError, Definitions, load_definitions, set_names
 from gateway.errors import GatewayError
 
-Row = tuple[str, str, str, str]
+Row = tuple[str, ...]  # field, bits, code, meaning; of a 708 word field, bits, code, value, unit, note
 
 SET_HEADINGS = ("set", "equipment", "labels")
 LABEL_HEADINGS = (
@@ -30,7 +32,7 @@ def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]
     status = arinc429.Status(int(values.status[0]))
     name = definition.name if definition else f"not in {definitions.name}"
     meaning = f.SSM_TABLES[definition.ssm][ssm] if definition else "depends on the label"
-    rows = [
+    rows: list[Row] = [
         ("label", "1-8", f"{label:03o}", name),
         ("SDI", "9-10", f"{int(parts.sdi[0]):02b}", "data" if definition and not definition.has_sdi else "source"),
         ("data", "11-29", f"{int(parts.data[0]):019b}", f"0x{int(parts.data[0]):05x}"),
@@ -99,38 +101,81 @@ def _definitions(name: str) -> Definitions:
 
 
 def explain_708(text: str, profile_name: str) -> list[Row]:
-    """Rows for one ARINC 708 word in hexadecimal; the header alone is enough."""
-    data = _bytes(text, (f.HEADER_708_BYTES, f.WORD_708_BYTES))
+    """Rows for one ARINC 708 word in hexadecimal; the header alone is enough, and bins need the whole word."""
+    data = _bytes(text, range(f.HEADER_708_BYTES, f.LONGEST_WORD_708_BITS // 8 + 2))
     try:
         profile = arinc708.load_profile(profile_name)
+    except OSError as error:
+        raise GatewayError(f"{profile_name} cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise GatewayError(str(error)) from error
-    whole = np.frombuffer(data.ljust(f.WORD_708_BYTES, b"\0"), np.uint8)[np.newaxis]
-    radial = arinc708.unpack(whole, profile)
+    word = np.frombuffer(data, np.uint8)[np.newaxis]
+    header = arinc708.headers(word, profile)
     bits = int.from_bytes(data[: f.HEADER_708_BYTES], "little")
-    gain = float(radial.gain_db[0])
-    meanings = {
-        "label": f"{int(radial.label[0]):03o} octal",
-        "control_accept": ("none", "indicator 1", "indicator 2", "both indicators")[int(radial.control_accept[0])],
-        "slave": "slave" if radial.slave[0] else "master",
-        "annunciations": _names(f.ANNUNCIATIONS_708, int(radial.annunciations[0])),
-        "faults": _names(profile.faults, int(radial.faults[0])),
-        "stabilised": "on" if radial.stabilised[0] else "off",
-        "mode": profile.modes[int(radial.mode[0])],
-        "tilt": f"{radial.tilt_deg[0]:+.2f} deg",
-        "gain": "calibrated" if np.isnan(gain) else ("maximum" if gain == 0 else f"{gain:g} dB"),
-        "range": f"{radial.range_nm[0]:g} NM",
-        "data_accept": ("none", "1", "2", "any")[int(radial.data_accept[0])],
-        "scan_angle": f"{radial.scan_angle_deg[0]:+.3f} deg from the {profile.scan_angle_zero}",
-    }
-    rows = [
-        (name, f"{first}-{first + width - 1}", f"{bits >> first & (1 << width) - 1:0{width}b}", meanings[name])
-        for name, (first, width) in f.HEADER_708.items()
+    places = sorted((f.HEADER_708 | f.SPARE_708).items(), key=lambda item: item[1])
+    codes = {name: bits >> first & (1 << width) - 1 for name, (first, width) in places}
+    codes["label"] = int(header.label[0])  # the one field sent most significant bit first
+    said = _values(header, codes, profile)
+    rows: list[Row] = [
+        (
+            name,
+            _span(first, first + width - 1),
+            f"{codes[name]:0{width}b}",
+            *said[name],
+            _note(name, codes[name], profile),
+        )
+        for name, (first, width) in places
     ]
-    if len(data) == f.WORD_708_BYTES:
-        levels = np.bincount(radial.bins[0])
-        counts = ", ".join(f"level {level}: {count}" for level, count in enumerate(levels.tolist()) if count)
-        rows.append(("bins", f"64-{f.WORD_708_BITS - 1}", f"{profile.bins} x {profile.bits_per_bin}", counts))
+    start = 8 * f.HEADER_708_BYTES
+    payload = _span(start, start + profile.bins * profile.bits_per_bin - 1)
+    if len(data) != profile.word_bytes:
+        return [*rows, ("bins", payload, "", "", "", f"not shown: {len(data)} bytes, of {profile.word_bytes}")]
+    return rows + _bins(arinc708.unpack(word, profile), payload, profile)
+
+
+def _values(header: arinc708.Header, codes: dict[str, int], profile: arinc708.Profile) -> dict[str, tuple[str, str]]:
+    """The value of each header field, and its unit."""
+    gain = float(header.gain_db[0])
+    return dict.fromkeys(f.SPARE_708, ("", "")) | {
+        "label": (f"{codes['label']:03o}", "octal"),
+        "control_accept": (("none", "indicator 1", "indicator 2", "both indicators")[codes["control_accept"]], ""),
+        "slave": ("slave" if codes["slave"] else "master", ""),
+        "annunciations": (_names(f.ANNUNCIATIONS_708, codes["annunciations"]), ""),
+        "faults": (_names(profile.faults, codes["faults"]), ""),
+        "stabilised": ("on" if codes["stabilised"] else "off", ""),
+        "mode": (profile.modes[codes["mode"]], ""),
+        "tilt": (f"{header.tilt_deg[0]:+.2f}", "deg"),
+        "gain": ("calibrated", "") if np.isnan(gain) else (f"{gain:g}", "dB"),
+        "range": (f"{header.range_nm[0]:g}", "NM"),
+        "data_accept": (("none", "1", "2", "any")[codes["data_accept"]], ""),
+        "scan_angle": (f"{header.scan_angle_deg[0]:+.3f}", "deg"),
+    }
+
+
+def _note(name: str, code: int, profile: arinc708.Profile) -> str:
+    if name in f.SPARE_708:
+        return "UNUSUAL: a spare bit is set" if code else ""
+    if name == "label" and code not in profile.labels:
+        return f"UNUSUAL: {profile.name} has {', '.join(f'{label:03o}' for label in profile.labels)}"
+    if name == "mode" and profile.modes[code] == arinc708.RESERVED:
+        return "UNUSUAL: a reserved code"
+    if name == "scan_angle":
+        given, sent = "clockwise from the nose", f"{profile.scan_angle_sense} from the {profile.scan_angle_zero}"
+        return given if sent == given else f"{given}; sent {sent}"
+    return "maximum" if name == "gain" and code == 0 else ""
+
+
+def _bins(radials: arinc708.Radials, payload: str, profile: arinc708.Profile) -> list[Row]:
+    """How many bins have each level that occurs, and how wide a bin is."""
+    width_m = radials.range_nm[0] * 1852 / profile.bins
+    rows: list[Row] = [
+        ("bins", payload, "", str(profile.bins), "", f"of {profile.bits_per_bin} bits, {width_m:.1f} m each")
+    ]
+    for level, count in enumerate(np.bincount(radials.bins[0]).tolist()):
+        name = profile.level_names[level]
+        note = "UNUSUAL: a reserved code" if name == arinc708.RESERVED else ""
+        if count:
+            rows.append((name, "", f"{level:0{profile.bits_per_bin}b}", str(count), "bins", note))
     return rows
 
 
@@ -138,11 +183,12 @@ def _names(names: tuple[str, ...], code: int) -> str:
     return ", ".join(name for k, name in enumerate(names) if code >> k & 1) or "none"
 
 
-def _bytes(text: str, lengths: tuple[int, ...]) -> bytes:
+def _bytes(text: str, lengths: Sequence[int]) -> bytes:
     try:
         data = bytes.fromhex(text.removeprefix("0x"))
     except ValueError as error:
         raise GatewayError(f"{text!r} is not hexadecimal") from error
     if len(data) not in lengths:
-        raise GatewayError(f"{len(data)} bytes given, {' or '.join(str(n) for n in lengths)} needed")
+        needed = lengths[0] if len(lengths) == 1 else f"{lengths[0]} to {lengths[-1]}"
+        raise GatewayError(f"{len(data)} bytes given, {needed} needed")
     return data

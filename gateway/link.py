@@ -12,8 +12,9 @@ from decoders import formats as f
 from decoders.arinc429 import JoinRule
 from decoders.definitions import Definitions, for_equipment, load_definitions
 from decoders.health429 import EQUIPMENT, BusHealth
+from decoders.profiles import Profile
 from decoders.racklink import ChannelCount, Framer, Hello, Packet
-from gateway.config import AdapterConfig
+from gateway.config import AdapterConfig, definitions_of, profile_of
 
 SEQUENCE_RANGE = 1 << 32
 FLAG_NAMES = {
@@ -48,7 +49,7 @@ class Channel429:
 class Channel708:
     """An ARINC 708 channel."""
 
-    profile: str
+    profile: Profile
     packet_type: ClassVar[int] = f.WORD_708
     role: ClassVar[str] = "radar"
 
@@ -58,7 +59,7 @@ class Link:
     """State of one bridge, kept over reconnections."""
 
     config: AdapterConfig
-    radar_profile: str
+    radar_profile: Profile
     framer: Framer = field(default_factory=Framer)
     counters: Counter[str] = field(default_factory=Counter)
     losses: Counter[str] = field(default_factory=Counter)  # since the last verdict
@@ -70,9 +71,11 @@ class Link:
     def __post_init__(self) -> None:
         for number, channel in self.config.channels.items():
             if channel.kind == "arinc708":
-                self.channels[number] = Channel708(channel.profile or self.radar_profile)
+                self.channels[number] = Channel708(
+                    profile_of(channel.profile) if channel.profile else self.radar_profile
+                )
             elif channel.definitions:
-                self._take(number, channel.definitions, channel.orientation, f.KIND_429_HIGH)
+                self._take(number, definitions_of(channel.definitions), channel.orientation, f.KIND_429_HIGH)
 
     def succeed(self, before: "Link") -> None:
         """Take over the channels and counters of a link whose pipeline failed; bytes half framed are lost with it."""
@@ -93,7 +96,7 @@ class Link:
                     self.counters["channels_of_unknown_equipment"] += 1
                 else:
                     orientation = configured.orientation if configured else f.ORIENTATIONS[said.orientation]
-                    self._take(said.channel, name, orientation, said.kind)
+                    self._take(said.channel, load_definitions(name), orientation, said.kind)
             else:
                 self.counters["channels_of_unknown_kind"] += 1
 
@@ -108,13 +111,13 @@ class Link:
             name = for_equipment(equipment & 0xFF)
             if name and self._said.get(number) == equipment:
                 configured = self.config.channels.get(number)
-                self._take(number, name, configured.orientation if configured else "wire", f.KIND_429_HIGH)
+                orientation = configured.orientation if configured else "wire"
+                self._take(number, load_definitions(name), orientation, f.KIND_429_HIGH)
                 return name
             self._said[number] = equipment
         return None
 
-    def _take(self, number: int, definitions_name: str, orientation: str, kind: int) -> None:
-        definitions = load_definitions(definitions_name)
+    def _take(self, number: int, definitions: Definitions, orientation: str, kind: int) -> None:
         configured = self.config.channels.get(number)
         delays_ns = np.zeros(256, np.int64)
         for label, delay_ms in configured.delays_ms.items() if configured else ():

@@ -8,17 +8,19 @@ from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from decoders import arinc429, arinc708
+from decoders import arinc429, arinc708, control708
 from decoders import formats as f
 from decoders.health429 import Finding
 from decoders.racklink import MalformedBody, Packet, heartbeat, hello, radar_word, words429
-from gateway.config import RackConfig
+from gateway.config import RackConfig, profile_of
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
 from gateway.link import SPOILT, Channel429, Channel708, Link
 from gateway.records import Note, Raw, Record, Status, Tick
 from gateway.timebase import Timebase
 from monitor.aircraft import Aircraft, status_name
+from monitor.control_echo import ControlEcho
 from monitor.integrity import Comparison, Monitor, Verdict
 from monitor.scans import SILENCE_NS, Scan, ScanBuilder
 
@@ -46,10 +48,12 @@ class Pipeline:
         self._config = config
         self._monitor = monitor
         self._watcher = watcher
-        self._links = {a.name: Link(a, config.radar_profile) for a in config.adapters}
+        profile = profile_of(config.radar_profile)
+        self._links = {a.name: Link(a, profile) for a in config.adapters}
         self._timebase = Timebase()
         self._aircraft = Aircraft(config.monitor.height_source)
         self._scans = ScanBuilder()
+        self._echo = ControlEcho(config.monitor.control_delay_s)
         self._counters: Counter[str] = Counter()
         self._now_ns = 0  # common time of the latest word
         self._now_host_ns: int | None = None  # and when that word was read
@@ -64,6 +68,7 @@ class Pipeline:
         if before:
             self._counters = before._counters
             self._scans.number = before._scans.number
+            self._echo.unlike = before._echo.unlike
             for name, link in self._links.items():
                 link.succeed(before._links[name])
 
@@ -92,7 +97,8 @@ class Pipeline:
             return
         for scan in self._scans.finish():
             yield from self._judge(scan, self._last)
-        counters = dict(self._counters) | {"clock_restarts": self._timebase.restarts}
+        counters = dict(self._counters)
+        counters |= {"clock_restarts": self._timebase.restarts, "radials_unlike_command": self._echo.unlike}
         for name, link in self._links.items():
             counters |= {f"{name}.{key}": value for key, value in link.all_counters().items()}
         yield SummaryEvent(self._last.stamp.utc_ns, self._last.sequence, dict(sorted(counters.items())))
@@ -174,6 +180,7 @@ class Pipeline:
             for scan in self._scans.finish():
                 yield from self._judge(scan, record)
             self._aircraft = Aircraft(self._config.monitor.height_source)
+            self._echo.forget()
             reason = f"the bridge's clock began anew at {packet.time_ns / 1e9:.3f} s; the state before it is dropped"
             self._troubles[f"clock of {record.adapter}"] = f"degraded: {record.adapter}: {reason}"
             yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "CLOCK_RESTARTED", reason)
@@ -199,6 +206,8 @@ class Pipeline:
         yield from self._hear(f"{record.adapter}/{packet.channel}", record)
         for finding in channel.health.feed(block.time_ns, values):
             yield self._finding(f"{record.adapter}/{packet.channel}", finding, record)
+        if channel.definitions.equipment_id == control708.PANEL:
+            self._command(channel, block.time_ns + offset_ns, block.words, values)
         true_ns = block.time_ns + offset_ns - channel.delays_ns[values.label]
         self._aircraft.feed(channel.definitions, true_ns, block.words, values, channel.join_rule)
 
@@ -207,18 +216,35 @@ class Pipeline:
         self._counters[f"{about}.{state.lower()}"] += 1
         return StatusEvent(record.stamp.utc_ns, record.sequence, about, state, finding.reason)
 
+    def _command(
+        self, channel: Channel429, time_ns: NDArray[np.int64], words: NDArray[np.uint32], values: arinc429.Values429
+    ) -> None:
+        for k in np.flatnonzero(values.status == arinc429.Status.NORMAL):
+            definition = channel.definitions.labels[int(values.label[k])]
+            command = control708.decode(int(words[k]), definition, self._echo.command)
+            self._echo.feed_command(int(time_ns[k]), command)
+
     def _radar(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         word = radar_word(packet)
         link.counters["words_708"] += 1
-        usable = word.bit_count == f.WORD_708_BITS and (yield from self._claim(link, packet, record))
         channel = link.channels.get(packet.channel)
+        whole = not isinstance(channel, Channel708) or word.bit_count == channel.profile.word_bits
+        if isinstance(channel, Channel708) and not whole:
+            link.counters["words_708_" + ("short" if word.bit_count < channel.profile.word_bits else "long")] += 1
+        usable = whole and (yield from self._claim(link, packet, record))
         if not usable or not isinstance(channel, Channel708):
             link.counters["words_708_unused"] += 1
             return
         yield from self._hear(RADAR, record)
         radials = arinc708.unpack(np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile)
-        offset_ns = yield from self._offset_ns(packet, record)
-        for scan in self._scans.feed(np.array([packet.time_ns + offset_ns]), radials):
+        for bit, name in enumerate(f.UNUSUAL_708):
+            if radials.unusual[0] >> bit & 1:
+                link.counters[f"words_708_{name}"] += 1
+        time_ns = packet.time_ns + (yield from self._offset_ns(packet, record))
+        if finding := self._echo.feed_radial(time_ns, radials):
+            link.counters[finding.state.lower()] += 1
+            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, *finding)
+        for scan in self._scans.feed(np.array([time_ns]), radials):
             yield from self._judge(scan, record)
 
     def _judge(self, scan: Scan, record: Record) -> Iterator[Event]:
@@ -232,6 +258,7 @@ class Pipeline:
             tilt_deg=scan.tilt_deg,
             gaps=scan.missing,
             repeated=scan.repeated,
+            cut_off=scan.cut_off,
         )
         if self._monitor is None:
             return

@@ -7,7 +7,7 @@ import numpy as np
 from decoders import arinc429, arinc708
 from decoders import formats as f
 from decoders.racklink import MalformedBody, Packet, hello, radar_word, words429
-from gateway.config import RackConfig
+from gateway.config import RackConfig, profile_of
 from gateway.console import clock
 from gateway.link import FLAG_NAMES, SPOILT, Channel429, Channel708, Link
 from gateway.records import Raw, Record
@@ -15,7 +15,7 @@ from gateway.records import Raw, Record
 
 def lines(records: Iterable[Record], config: RackConfig) -> Iterator[str]:
     """The lines of all words in records."""
-    links = {a.name: Link(a, config.radar_profile) for a in config.adapters}
+    links = {a.name: Link(a, profile_of(config.radar_profile)) for a in config.adapters}
     for record in records:
         if not isinstance(record, Raw) or record.adapter not in links:
             continue
@@ -54,12 +54,24 @@ def _words(link: Link, packet: Packet) -> Iterator[str]:
 def _radar(link: Link, packet: Packet) -> str:
     word = radar_word(packet)
     channel = link.channels.get(packet.channel)
-    head = word.data[: f.HEADER_708_BYTES].hex()
-    if not isinstance(channel, Channel708) or word.bit_count != f.WORD_708_BITS or packet.flags & SPOILT:
-        return f"{head}...  {word.bit_count} bits, not decoded"
-    radial = arinc708.unpack(np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile)
-    lit = np.count_nonzero(radial.bins)
+    text = f"{word.data[: f.HEADER_708_BYTES].hex()}...  "
+    readable = word.bit_count >= 8 * f.HEADER_708_BYTES and not packet.flags & SPOILT & ~f.FLAG_WORD_LENGTH
+    if not isinstance(channel, Channel708) or not readable:
+        return f"{text}{word.bit_count} bits, not decoded"
+    array, profile = np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile
+    if word.bit_count == profile.word_bits:
+        radial = arinc708.unpack(array, profile)
+        return f"{text}{_header(radial)}  {np.count_nonzero(radial.bins)} of {profile.bins} bins lit{_unusual(radial)}"
+    header = arinc708.headers(array, profile)
+    return f"{text}{_header(header)}  {word.bit_count} bits, bins not decoded{_unusual(header)}"
+
+
+def _header(radial: arinc708.Header | arinc708.Radials) -> str:
     return (
-        f"{head}...  angle {radial.scan_angle_deg[0]:+8.3f}  tilt {radial.tilt_deg[0]:+6.2f}  "
-        f"{radial.range_nm[0]:3.0f} NM  mode {radial.mode[0]}  {lit} of {radial.bins.shape[1]} bins lit"
+        f"angle {radial.scan_angle_deg[0]:+8.3f}  tilt {radial.tilt_deg[0]:+6.2f}  "
+        f"{radial.range_nm[0]:3.0f} NM  mode {radial.mode[0]}"
     )
+
+
+def _unusual(radial: arinc708.Header | arinc708.Radials) -> str:
+    return "".join(f"  {name}" for bit, name in enumerate(f.UNUSUAL_708) if radial.unusual[0] >> bit & 1)

@@ -1,19 +1,22 @@
 """Radials to scans: where one sweep of the antenna ends and the next begins.
 
 A sweep ends where the scan angle turns back or jumps (one-directional radars jump from one end to the other), where
-tilt, range or mode change, or after a silence. What is missing or repeated inside a sweep is counted from
-the usual step.
+tilt, range or mode change, or after a silence. What is missing or repeated inside a sweep is counted from the usual
+step, and what is missing at its ends from the sweep before. An angle that trembles by one code neither turns nor moves.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from decoders.arinc708 import Radials
+from decoders.formats import SCAN_ANGLE_LSB_DEG
 from monitor.track import wrap
 
+JITTER_DEG = 1.5 * SCAN_ANGLE_LSB_DEG  # more than one code and less than two
+TREMBLE_DEG = 0.25 * SCAN_ANGLE_LSB_DEG  # so that three codes for two are a tremble, and four a missing radial
 JUMP_DEG = 30.0  # farther than any step between neighbours, nearer than any fly-back
 SILENCE_NS = 2_000_000_000
 LONGEST_SWEEP = 4096  # radials; a spinning antenna must still give scans
@@ -36,11 +39,13 @@ class Scan:
     faults: int  # header bits 18 to 24 of all its radials together, bit 18 the least significant
     missing: int
     repeated: int
+    cut_off: int = 0  # radials that the whole sweep before had at the ends, and this whole sweep has not
 
     @property
     def sector_deg(self) -> tuple[float, float]:
-        """The smallest and the largest scan angle."""
-        return float(self.scan_angle_deg.min()), float(self.scan_angle_deg.max())
+        """The ends of the sweep; across the tail one of them lies beyond 180 degrees, as in (170, 190)."""
+        angles = np.unwrap(self.scan_angle_deg, period=360)
+        return float(angles.min()), float(angles.max())
 
 
 class ScanBuilder:
@@ -52,13 +57,19 @@ class ScanBuilder:
         self._settings = (0.0, 0.0, 0, False, 0)  # tilt, range, mode, stabilised, bins
         self._faults = 0
         self._direction = 0.0
-        self._moved_ns = 0  # when the scan angle last changed
+        self._farthest_deg = 0.0  # in the direction of the sweep
+        self._rest_deg = 0.0  # where the antenna was when it last moved
+        self._moved_ns = 0  # and when
+        self._at_rest = 0  # radials since then
+        self._began_whole = False
+        self._before: Scan | None = None  # the last sweep that was whole, if it is the one before
 
     def feed(self, time_ns: NDArray[np.int64], radials: Radials) -> Iterator[Scan]:
         """Take radials (n,) in order of time; give the scans that they complete."""
         angles = np.asarray(radials.scan_angle_deg, float)
         limits = (radials.annunciations >> 4 & 1).astype(bool)  # header bit 17, the fifth annunciation
         for k in range(len(time_ns)):
+            time, angle = int(time_ns[k]), float(angles[k])
             settings = (
                 float(radials.tilt_deg[k]),
                 float(radials.range_nm[k]),
@@ -66,40 +77,56 @@ class ScanBuilder:
                 bool(radials.stabilised[k]),
                 radials.bins.shape[1],
             )
-            if self._rows and (settings != self._settings or self._turns(int(time_ns[k]), angles[k])):
-                yield self._close()
-            if not self._rows or angles[k] != self._rows[-1][1]:
-                self._moved_ns = int(time_ns[k])
+            if self._rows:
+                turned, broken = self._turns(angle), self._breaks(time, angle)
+                if turned or broken or settings != self._settings:
+                    yield self._close(whole=turned and not broken)
             self._settings = settings
             self._faults |= int(radials.faults[k])
-            self._rows.append((int(time_ns[k]), angles[k], bool(limits[k]), radials.bins[k]))
+            self._follow(time, angle)
+            self._rows.append((time, angle, bool(limits[k]), radials.bins[k]))
 
     def finish(self) -> Iterator[Scan]:
         """Give the sweep that is still open, if any."""
         if self._rows:
-            yield self._close()
+            yield self._close(whole=False)
 
     def skip(self) -> int:
         """The number of a scan that never came: what is said of it must not pass for the scan before."""
         self.number += 1
         return self.number - 1
 
-    def _turns(self, time_ns: int, angle_deg: float) -> bool:
-        last_ns, last_deg = self._rows[-1][:2]
-        step = (angle_deg - last_deg + 180) % 360 - 180
-        turned = step * self._direction < 0
-        if step and not turned:
-            self._direction = step
-        silent = not 0 <= time_ns - last_ns <= SILENCE_NS
-        stuck = not step and time_ns - self._moved_ns > STUCK_NS
-        return turned or abs(step) > JUMP_DEG or silent or stuck or len(self._rows) >= LONGEST_SWEEP
+    def _breaks(self, time_ns: int, angle_deg: float) -> bool:
+        silent = not 0 <= time_ns - self._rows[-1][0] <= SILENCE_NS
+        stuck = abs(_step(self._rest_deg, angle_deg)) <= JITTER_DEG and time_ns - self._moved_ns > STUCK_NS
+        return silent or stuck or len(self._rows) >= LONGEST_SWEEP
 
-    def _close(self) -> Scan:
+    def _turns(self, angle_deg: float) -> bool:
+        back = -_step(self._farthest_deg, angle_deg) * self._direction
+        return back > JITTER_DEG or abs(_step(self._rows[-1][1], angle_deg)) > JUMP_DEG
+
+    def _follow(self, time_ns: int, angle_deg: float) -> None:
+        """Keep how far the antenna has come, and since when it rests."""
+        if not self._rows:
+            self._direction = 0.0
+            self._farthest_deg = angle_deg
+        step = _step(self._farthest_deg, angle_deg)
+        if not self._direction and abs(step) > JITTER_DEG:
+            self._direction = float(np.sign(step))
+        if step * self._direction > 0:
+            self._farthest_deg = angle_deg
+        if not self._rows or abs(_step(self._rest_deg, angle_deg)) > JITTER_DEG:
+            self._rest_deg, self._moved_ns, self._at_rest = angle_deg, time_ns, 0
+        else:
+            self._at_rest += 1
+
+    def _close(self, whole: bool) -> Scan:
         tilt, range_nm, mode, stabilised, _ = self._settings
         times, angles, limits, bins = zip(*self._rows, strict=True)
         steps = np.abs(wrap(np.diff(np.array(angles))))
         moving = steps[steps > 0]
-        missing = int(np.sum(np.maximum(np.round(moving / np.median(moving)) - 1, 0))) if moving.size else 0
+        usual = _usual(moving)
+        rested = self._at_rest if times[-1] - self._moved_ns > STUCK_NS // 2 else 0  # trembling all the while
         scan = Scan(
             self.number,
             np.array(times, np.int64),
@@ -111,11 +138,43 @@ class ScanBuilder:
             mode,
             stabilised,
             self._faults,
-            missing,
-            int(np.sum(steps == 0)),
+            missing=int(np.sum(np.maximum(np.round((moving - TREMBLE_DEG) / usual) - 1, 0))) if usual else 0,
+            repeated=max(int(np.sum(steps == 0)), rested),
         )
+        if whole and self._began_whole:
+            if self._before and usual:
+                scan = replace(scan, cut_off=_cut_off(self._before, scan, usual))
+            self._before = scan
+        elif not whole:
+            self._before = None
         self.number += 1
         self._rows = []
-        self._direction = 0.0
         self._faults = 0
+        self._began_whole = whole
         return scan
+
+
+def _usual(steps_deg: NDArray[np.float64]) -> float:
+    """The radar's own step, which whole codes round up and down: the mean of those nearest to the median."""
+    if not steps_deg.size:
+        return 0.0
+    return float(steps_deg[np.abs(steps_deg - np.median(steps_deg)) < JITTER_DEG].mean())
+
+
+def _cut_off(before: Scan, scan: Scan, step_deg: float) -> int:
+    """How many steps the ends of `before` lie beyond those of `scan`.
+
+    A to-and-fro sweep begins one step from where the one before ended, and an antenna does not turn at the same step
+    each time: one step more or less is no loss.
+    """
+    (low, high), (low_before, high_before) = scan.sector_deg, before.sector_deg
+    turn = round((low + high - low_before - high_before) / 720) * 360  # of sectors across the tail
+    lost = {low: low - turn - low_before, high: high_before + turn - high}
+    begin = float(scan.scan_angle_deg[0])
+    if abs(_step(float(before.scan_angle_deg[-1]), begin)) <= JUMP_DEG:
+        lost[min(lost, key=lambda end: abs(_step(end, begin)))] -= step_deg
+    return sum(steps for steps in (round(degrees / step_deg) for degrees in lost.values()) if steps > 1)
+
+
+def _step(from_deg: float, to_deg: float) -> float:
+    return (to_deg - from_deg + 180) % 360 - 180

@@ -49,6 +49,7 @@ class MonitorSettings(BaseModel):
     position_gate: bool = Field(
         True, description="demand that the GNSS receiver vouches for its position with labels 273 and 130"
     )
+    control_delay_s: float = Field(1.0, ge=0, le=60, description="what the radar may take to do what its panel asks")
 
     @property
     def pairs_needed(self) -> int:

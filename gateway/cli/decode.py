@@ -4,6 +4,8 @@ from typing import Annotated
 
 import typer
 
+WIDEST = 200  # a table for a report is as wide as it must be, whatever the terminal
+
 
 def decode_429(
     words: Annotated[list[str], typer.Argument(help="32-bit words in hexadecimal, bit 1 the least significant")],
@@ -13,25 +15,26 @@ def decode_429(
     """Explain ARINC 429 words."""
     from gateway.explain import explain_429
 
-    _print("ARINC 429", [explain_429(word, definitions, orientation) for word in words])
+    for word in words:
+        _print(("field", "bits", "code", "meaning"), explain_429(word, definitions, orientation))
 
 
 def decode_708(
-    word: Annotated[str, typer.Argument(help="200 bytes in hexadecimal, or the 8 of the header alone")],
-    profile: Annotated[str, typer.Option(help="arinc708, arinc708a or wxr2100_6bit")] = "arinc708",
+    word: Annotated[str, typer.Argument(help="200 bytes in hexadecimal; the 8 of the header are enough")],
+    profile: Annotated[str, typer.Option(help="arinc708, arinc708a, wxr2100_6bit, or a TOML file")] = "arinc708",
 ) -> None:
     """Explain an ARINC 708 radar word."""
     from gateway.explain import explain_708
 
-    _print("ARINC 708", [explain_708(word, profile)])
+    _print(("field", "bits", "code", "value", "unit", "note"), explain_708(word, profile))
 
 
-def _print(title: str, explained: list[list[tuple[str, str, str, str]]]) -> None:
+def _print(columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    from rich.box import MARKDOWN
     from rich.console import Console
     from rich.table import Table
 
-    for rows in explained:
-        table = Table("field", "bits", "code", "meaning", title=title)
-        for row in rows:
-            table.add_row(*row)
-        Console().print(table)
+    table = Table(*columns, box=MARKDOWN)
+    for row in rows:
+        table.add_row(*row)
+    Console(width=WIDEST).print(table)

@@ -114,7 +114,7 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
         ("calibration file", "name: Field required"),
     ),
     "bad hexadecimal": (lambda d: ["decode", "429", "12g4"], ("12g4", "is not hexadecimal")),
-    "bad length": (lambda d: ["decode", "708", "b443"], ("2 bytes given, 8 or 200 needed",)),
+    "bad length": (lambda d: ["decode", "708", "b443"], ("2 bytes given, 8 to 256 needed",)),
     "unknown set": (lambda d: ["decode", "429", "1", "--set", "gps"], ("no definitions 'gps'", "gnss_743a")),
     "half a configuration": (lambda d: ["thresholds", "--n", "60"], ("give all of --n",)),
     "source without port": (lambda d: ["run", "--source", "serial:socket://host"], ("socket://HOST:PORT",)),

@@ -30,8 +30,10 @@ VERBS = (
 
 
 def rows(text: str) -> list[list[str]]:
-    """The cells of a printed table."""
-    return [[cell.strip() for cell in line.strip("│").split("│")] for line in text.splitlines() if line.startswith("│")]
+    """The cells of a printed table; of a Markdown one with its head."""
+    lines = [line.strip().replace("|", "│") for line in text.splitlines()]
+    found = [[cell.strip() for cell in line.strip("│").split("│")] for line in lines if line.startswith("│")]
+    return [row for row in found if not row[0].startswith("--")]
 
 
 def test_help_imports_nothing_heavy() -> None:
@@ -56,33 +58,82 @@ def test_every_verb_explains_itself(verb: str) -> None:
 def test_a_radar_header_is_explained_field_by_field() -> None:
     done = shadebus("decode", "708", "b443047a0e80767c")
     assert done.returncode == 0
-    found = {row[0]: row[1:] for row in rows(done.stdout)}
-    assert found["label"] == ["0-7", "10110100", "055 octal"]
-    assert found["control_accept"][2] == "both indicators"
-    assert found["slave"][2] == "master"
-    assert found["annunciations"][2] == "weather_alert"
-    assert found["faults"][2] == "cooling"
-    assert found["stabilised"][2] == "on"
-    assert found["mode"][2] == "weather_turbulence"
-    assert found["tilt"] == ["29-35", "1110011", "-3.25 deg"]
-    assert found["gain"][2] == "maximum"
-    assert found["range"] == ["42-47", "100000", "160 NM"]
-    assert found["data_accept"][2] == "any"
-    assert found["scan_angle"] == ["51-62", "111110001110", "-10.020 deg from the nose"]
-    assert "bins" not in found
+    assert rows(done.stdout) == [
+        ["field", "bits", "code", "value", "unit", "note"],
+        ["label", "0-7", "00101101", "055", "octal", ""],
+        ["control_accept", "8-9", "11", "both indicators", "", ""],
+        ["slave", "10", "0", "master", "", ""],
+        ["spare_11_12", "11-12", "00", "", "", ""],
+        ["annunciations", "13-17", "00010", "weather_alert", "", ""],
+        ["faults", "18-24", "0000001", "cooling", "", ""],
+        ["stabilised", "25", "1", "on", "", ""],
+        ["mode", "26-28", "110", "weather_turbulence", "", ""],
+        ["tilt", "29-35", "1110011", "-3.25", "deg", ""],
+        ["gain", "36-41", "000000", "0", "dB", "maximum"],
+        ["range", "42-47", "100000", "160", "NM", ""],
+        ["spare_48", "48", "0", "", "", ""],
+        ["data_accept", "49-50", "11", "any", "", ""],
+        [
+            "scan_angle",
+            "51-62",
+            "111110001110",
+            "-10.020",
+            "deg",
+            "clockwise from the nose",
+        ],
+        ["spare_63", "63", "0", "", "", ""],
+        ["bins", "64-1599", "", "", "", "not shown: 8 bytes, of 200"],
+    ]
 
 
-def test_a_whole_radar_word_has_its_bins_counted() -> None:
+def test_a_whole_radar_word_has_its_bins_counted_by_level() -> None:
     word = "b443047a0e80767c" + "ff" * 3 + "00" * 189
-    (bins,) = [row for row in rows(shadebus("decode", "708", word).stdout) if row[0] == "bins"]
-    assert bins == ["bins", "64-1599", "512 x 3", "level 0: 504, level 7: 8"]
+    found = rows(shadebus("decode", "708", word).stdout)[16:]
+    assert found == [
+        ["bins", "64-1599", "", "512", "", "of 3 bits, 578.8 m each"],  # 160 NM of 1852 m
+        ["black", "", "000", "504", "bins", ""],
+        ["heavy_turbulence", "", "111", "8", "bins", ""],
+    ]
+
+
+def test_what_is_unusual_in_a_radar_word_is_noted() -> None:
+    bits = 0o057 | 7 << 26 | 1 << 12 | 1 << 48 | 1 << 63  # label 364 in wire order
+    word = bits.to_bytes(8, "little").hex() + "05" + "00" * 191
+    notes = {row[0]: row[5] for row in rows(shadebus("decode", "708", word).stdout) if "UNUSUAL" in row[5]}
+    spare, reserved = "UNUSUAL: a spare bit is set", "UNUSUAL: a reserved code"
+    assert notes == {
+        "label": "UNUSUAL: arinc708 has 055, 057",
+        "spare_11_12": spare,
+        "mode": reserved,
+        "spare_48": spare,
+        "spare_63": spare,
+        "reserved": reserved,
+    }
+
+
+def test_a_radar_word_is_explained_by_a_profile_of_ones_own(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text('[own]\nextends = "arinc708a"\nscan_angle_zero = "tail"\nscan_angle_sense = "counterclockwise"\n')
+    header = (0xB4 | 7 << 26 | 1024 << 51).to_bytes(8, "little").hex()
+    found = {row[0]: row[3:] for row in rows(shadebus("decode", "708", header, "--profile", own).stdout)}
+    assert found["mode"] == ["windshear_icon", "", ""]
+    assert found["scan_angle"] == ["+90.000", "deg", "clockwise from the nose; sent counterclockwise from the tail"]
+
+
+def test_a_mistake_in_a_profile_of_ones_own_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text('[own]\nextends = "arinc708"\nbin = 3\n')
+    for name, complaint in (("own.toml", "own.toml [own] bin: Unexpected"), ("no.toml", "no.toml cannot be read")):
+        done = shadebus("decode", "708", "b443047a0e80767c", "--profile", tmp_path / name)
+        assert done.returncode == 1
+        assert complaint in done.stderr
+        assert done.stderr.count("\n") == 1
 
 
 def test_arinc_429_words_are_explained_field_by_field() -> None:
     good, bad = arinc429.encode(0o324, -2.5), arinc429.encode(0o324, -2.5) ^ 1 << 31
     done = shadebus("decode", "429", f"{good:08x}", f"0x{bad:08X}")
     assert done.returncode == 0
-    found = rows(done.stdout)
+    found = [row for row in rows(done.stdout) if row[0] != "field"]
     names = [row[0] for row in found]
     assert names == 2 * ["label", "SDI", "data", "SSM", "parity", "value"]
     first, second = ({row[0]: row[1:] for row in part} for part in (found[:6], found[6:]))

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from gateway.config import RackConfig, check_config, load_config
+from gateway.config import RackConfig, TomlFile, check_config, load_config, profile_of
 from gateway.errors import GatewayError
+from gateway.link import Channel429, Channel708, Link
 from gateway.metadata import describe, recorded_config
 
 ADAPTER = '[[adapters]]\nname = "bridge"\nsource = "serial:/dev/x"\n'
@@ -51,6 +52,7 @@ def test_paths_count_from_where_the_rack_file_lies(tmp_path: Path) -> None:
             "no.toml cannot be read: No such",
         ),
         (ADAPTER + '[adapters.channels.0]\nkind = "arinc708"\nprofile = "x"', "profile: no profile 'x': use one of"),
+        ("radar_profile = 708\n" + ADAPTER, "radar_profile: write a name, or the path of a .toml file$"),
         ('radar_profile = "x"\n' + ADAPTER, "radar_profile: no profile 'x': use one of"),
         (ADAPTER + "[recording]\nsync_interval_s = 0", "recording.sync_interval_s: .*greater than 0"),
         (ADAPTER + "[monitor]\np_fa = 0.7", "monitor.p_fa: .*less than 0.5"),
@@ -93,3 +95,72 @@ def test_a_configuration_survives_the_recording_that_holds_it() -> None:
         "test",
     )
     assert recorded_config(describe(config, None)) == config
+
+
+OWN_PROFILE = '[my_radar]\nextends = "arinc708"\nscan_angle_zero = "tail"\n'
+OWN_SET = """[my_box]
+equipment_id = 0x0EE
+rows = [ { label = "310", name = "Mine", encoding = "disc", source = "me", confidence = "1 source" } ]
+"""
+OWN_FILES = f"""radar_profile = "files/radar.toml"
+{ADAPTER}
+[adapters.channels.0]
+kind = "arinc708"
+profile = "files/radar.toml"
+[adapters.channels.1]
+kind = "arinc429"
+definitions = "files/labels.toml"
+"""
+
+
+def own_files(tmp_path: Path, profile: str = OWN_PROFILE, labels: str = OWN_SET) -> Path:
+    folder = tmp_path / "files"
+    folder.mkdir()
+    (folder / "radar.toml").write_text(profile)
+    (folder / "labels.toml").write_text(labels)
+    return folder
+
+
+def test_profiles_and_definitions_of_ones_own_count_from_the_rack_file_and_are_kept_with_it(tmp_path: Path) -> None:
+    folder = own_files(tmp_path)
+    config = load(tmp_path, OWN_FILES)
+    for file in folder.iterdir():
+        file.unlink()
+    with_options = check_config({**config.model_dump(), "wait_for_devices": True}, "options")
+    restored = recorded_config(describe(with_options, None))
+    channels = restored.adapters[0].channels
+    assert channels[0].profile == restored.radar_profile == TomlFile(path=folder / "radar.toml", text=OWN_PROFILE)
+    link = Link(restored.adapters[0], profile_of(restored.radar_profile))
+    assert (link.radar_profile.name, link.radar_profile.scan_angle_zero) == ("my_radar", "tail")
+    radar, box = link.channels[0], link.channels[1]
+    assert isinstance(radar, Channel708)
+    assert isinstance(box, Channel429)
+    assert radar.profile == link.radar_profile
+    assert (box.definitions.equipment_id, box.definitions.labels[0o310].name) == (0xEE, "Mine")
+
+
+@pytest.mark.parametrize(
+    ("profile", "labels", "where"),
+    [
+        (OWN_PROFILE + "bins = 1", OWN_SET, r"channels\.0\.profile: .*radar\.toml \[my_radar\] bins: .*32"),
+        (OWN_PROFILE + "bins = 1", OWN_SET, r"radar_profile: .*radar\.toml \[my_radar\] bins: .*32"),
+        ("[", OWN_SET, r"radar\.toml is no TOML"),
+        (OWN_PROFILE, "[", r"channels\.1\.definitions: .*labels\.toml is no TOML"),
+        (OWN_PROFILE, OWN_SET.replace("310", "999"), r"labels\.toml:[0-9]+ \[my_box\] label 999"),
+    ],
+)
+def test_a_mistake_in_a_file_of_ones_own_is_named_with_both_files(
+    tmp_path: Path, profile: str, labels: str, where: str
+) -> None:
+    own_files(tmp_path, profile, labels)
+    with pytest.raises(GatewayError, match=where) as caught:
+        load(tmp_path, OWN_FILES)
+    assert str(tmp_path / "rack.toml") in str(caught.value)
+
+
+def test_a_profile_file_that_is_not_there_or_no_text_is_named(tmp_path: Path) -> None:
+    with pytest.raises(GatewayError, match=r"radar_profile: .*files/radar\.toml cannot be read: No such file"):
+        load(tmp_path, OWN_FILES)
+    (own_files(tmp_path) / "radar.toml").write_bytes(b"\xff")
+    with pytest.raises(GatewayError, match=r"radar_profile: .*files/radar\.toml is no TOML"):
+        load(tmp_path, OWN_FILES)

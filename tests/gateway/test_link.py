@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from decoders import formats as f
+from decoders.profiles import load_profile
 from decoders.racklink import ChannelCount, Framer, Hello, HelloChannel, Packet
 from gateway.config import AdapterConfig
 from gateway.link import Channel429, Channel708, Link
@@ -14,7 +15,7 @@ from tests.decoders.bus import word429
 
 def make(**channels: object) -> Link:
     table = {"name": "bridge", "source": "serial:x", "channels": {k.removeprefix("n"): v for k, v in channels.items()}}
-    return Link(AdapterConfig.model_validate(table), "arinc708")
+    return Link(AdapterConfig.model_validate(table), load_profile("arinc708"))
 
 
 def said(channel: int, kind: int, orientation: int = 0, equipment: int = 0) -> Hello:
@@ -79,7 +80,7 @@ def test_a_hello_tells_equipment_and_orientation(kind: int, orientation: int, na
 def test_a_hello_names_a_radar_channel() -> None:
     link = make()
     link.hello(said(0, f.KIND_708))
-    assert link.channels == {0: Channel708("arinc708")}
+    assert link.channels == {0: Channel708(load_profile("arinc708"))}
 
 
 def test_unknown_kinds_equipment_and_orientations_are_counted() -> None:
@@ -103,7 +104,7 @@ def test_configured_channels_win_over_the_hello() -> None:
     channel = configured[1]
     assert isinstance(channel, Channel429)
     assert (channel.definitions.name, channel.orientation) == ("adc_706", "label_swapped")
-    assert configured[2] == Channel708("wxr2100_6bit")
+    assert configured[2] == Channel708(load_profile("wxr2100_6bit"))
 
 
 def test_a_channel_configured_without_definitions_takes_them_from_the_hello() -> None:

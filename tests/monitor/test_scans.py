@@ -32,6 +32,7 @@ def radials(
         data_accept=flags,
         scan_angle_deg=np.array(angles, float),
         bins=np.tile(np.arange(n, dtype=np.uint8)[:, None], bins),
+        unusual=flags,
     )
 
 
@@ -186,3 +187,137 @@ def test_a_scan_that_never_came_has_a_number_of_its_own() -> None:
     assert sweeps.builder.skip() == first.number + 1
     sweeps.feed(radials([0, 1, 2]))
     assert [scan.number for scan in sweeps.finish()] == [0, 2]
+
+
+LSB = 360 / 4096
+FULL = list(range(-60, 61, 3))
+TO_AND_FRO = [*FULL, *FULL[-2::-1], *FULL[1:], *FULL[-2::-1]]
+
+
+@pytest.mark.parametrize("step_codes", [1, 2, 6, 12])
+def test_an_angle_that_trembles_by_one_code_neither_turns_nor_counts(step_codes: int) -> None:
+    codes = np.arange(-300, 301, step_codes)
+    tremble = np.where(np.arange(codes.size) % 3 == 1, -1, 0) if step_codes > 1 else 0
+    scans = Sweeps().feed(radials(list((codes + tremble) * LSB))).finish()
+    assert [(scan.scan_angle_deg.size, scan.missing) for scan in scans] == [(codes.size, 0)]
+
+
+def test_a_backward_tremble_at_every_other_radial_of_the_smallest_step_is_one_sweep() -> None:
+    codes = [code for k in range(100) for code in (k, k - 1)]
+    assert len(Sweeps().feed(radials([code * LSB for code in codes])).finish()) == 1
+
+
+@pytest.mark.parametrize("step_codes", [1.0, 2.0, 2.28, 2.4, 2.7, 5.69, 11.38, 34.13])
+@pytest.mark.parametrize("lost", [0, 1, 3])
+def test_a_step_that_is_no_whole_number_of_codes_has_no_more_missing_than_are_lost(
+    step_codes: float, lost: int
+) -> None:
+    codes = np.rint(np.arange(-100, 101) * step_codes)
+    (scan,) = Sweeps().feed(radials(list(np.delete(codes, slice(70, 70 + lost)) * LSB))).finish()
+    assert scan.missing == lost
+
+
+@pytest.mark.parametrize("codes", [2, 3])
+def test_a_retreat_of_more_than_one_code_is_a_turn(codes: int) -> None:
+    scans = Sweeps().feed(radials([0, 1, 2, 3, 3 - codes * LSB, 3 - 2 * codes * LSB])).finish()
+    assert [scan.scan_angle_deg.size for scan in scans] == [4, 2]
+
+
+def test_a_stuck_scanner_that_trembles_is_told_like_one_that_does_not() -> None:
+    rows = 2 * STUCK_NS // (STEP_MS * MS) + 30
+    scans = Sweeps().feed(radials([12.0 + LSB * (k % 2) for k in range(rows)])).finish()
+    per_scan = STUCK_NS // (STEP_MS * MS) + 1
+    assert [scan.scan_angle_deg.size for scan in scans] == [per_scan, per_scan, 28]
+    assert [scan.repeated for scan in scans[:2]] == [per_scan - 1] * 2
+
+
+def test_a_scanner_that_sticks_in_mid_sweep_is_told_after_two_seconds_with_the_radials_it_stood_for() -> None:
+    rest = STUCK_NS // (STEP_MS * MS)
+    moving = list(np.arange(0.0, 30.0))
+    first, second = Sweeps().feed(radials([*moving, *[29.0] * (rest + 20)])).finish()
+    assert (first.scan_angle_deg.size, first.repeated) == (30 + rest, rest)
+    assert (second.scan_angle_deg.size, second.repeated) == (20, 19)
+
+
+@pytest.mark.parametrize(
+    ("lost", "sizes"),
+    [
+        ([60], [41, 39, 40, 40]),  # 57 comes twice, the second a repeat
+        ([57, 60], [40, 39, 40, 40]),
+        ([60, 54], [40, 39, 40, 40]),
+    ],
+)
+def test_radials_lost_at_the_turn_leave_the_turn_where_it_was(lost: list[int], sizes: list[int]) -> None:
+    """The first time that each angle comes it is lost; 57 and 54 come again on the way back."""
+    angles = list(TO_AND_FRO)
+    for angle in lost:
+        angles.remove(angle)
+    scans = Sweeps().feed(radials(angles)).finish()
+    assert [scan.scan_angle_deg.size for scan in scans] == sizes
+    assert all(scan.sector_deg[0] in (-60, -57) for scan in scans)
+
+
+def test_a_radial_twice_because_those_around_the_turn_are_lost_is_a_repeat() -> None:
+    first, second = Sweeps().feed(radials([0, 3, 6, 9, 9, 6, 3, 0])).finish()
+    assert (first.scan_angle_deg.tolist(), first.repeated) == ([0, 3, 6, 9, 9], 1)
+    assert second.scan_angle_deg.tolist() == [6, 3, 0]
+
+
+def test_whole_sweeps_of_a_steady_radar_lose_nothing_at_their_ends() -> None:
+    for angles in (TO_AND_FRO * 2, FULL * 5, [*range(-120, 121, 3)] * 3):
+        scans = Sweeps().feed(radials(angles)).finish()
+        assert len(scans) > 2
+        assert [scan.cut_off for scan in scans] == [0] * len(scans)
+
+
+@pytest.mark.parametrize(("cut", "told"), [(0, 0), (1, 0), (2, 2), (7, 7)])
+def test_coverage_lost_at_the_end_of_a_fly_back_sweep_is_counted_against_the_sweep_before(cut: int, told: int) -> None:
+    end = len(FULL) - cut
+    scans = Sweeps().feed(radials([*FULL, *FULL, *FULL[:end], *FULL, *FULL])).finish()
+    assert [scan.cut_off for scan in scans] == [0, 0, told, 0, 0]
+    scans = Sweeps().feed(radials([*FULL, *FULL, *FULL[cut:], *FULL, *FULL])).finish()
+    assert [scan.cut_off for scan in scans] == [0, 0, told, 0, 0]
+
+
+def test_coverage_lost_around_a_turn_is_counted_on_both_sides_of_it() -> None:
+    back = FULL[-2::-1]
+    angles = [*FULL, *back, *FULL[1:-5], *back[5:], *FULL[1:], *back]
+    scans = Sweeps().feed(radials(angles)).finish()
+    assert sectors(scans)[2:4] == [(-57, 45), (-60, 42)]
+    # the fourth is compared with the third, which ended as early
+    assert [scan.cut_off for scan in scans] == [0, 0, 4, 0, 0, 0]
+
+
+def test_a_sector_that_narrows_is_told_once_and_one_that_widens_is_not() -> None:
+    narrow = list(range(-30, 31, 3))
+    scans = Sweeps().feed(radials(FULL * 2 + narrow * 3 + FULL * 2)).finish()
+    assert [scan.cut_off for scan in scans] == [0, 0, 20, 0, 0, 0, 0]
+    assert sectors(scans)[2:4] == [(-30, 30)] * 2
+
+
+def test_a_sweep_cut_by_a_change_of_settings_or_a_silence_is_no_measure_for_its_ends() -> None:
+    sweeps = Sweeps().feed(radials(FULL * 2))
+    sweeps.feed(radials(FULL[:20])).feed(radials(FULL[20:], tilt_deg=5.0)).feed(radials(FULL * 2, tilt_deg=5.0))
+    sweeps.feed(radials(FULL[:20], tilt_deg=5.0))
+    sweeps.now_ms += 3000
+    assert [scan.cut_off for scan in sweeps.feed(radials(FULL[20:] + FULL * 2)).finish()] == [0] * 10
+
+
+def test_thirty_degrees_lost_in_mid_sweep_make_two_sweeps_whose_ends_tell() -> None:
+    scans = Sweeps().feed(radials(FULL * 2 + [angle for angle in FULL if not 0 <= angle <= 30] + FULL)).finish()
+    assert sectors(scans)[2:4] == [(-60, -3), (33, 60)]
+    assert scans[2].cut_off == 21
+
+
+def test_a_sweep_across_the_tail_has_its_ends_beyond_180() -> None:
+    around = [170, 175, -180, -175, -170]
+    scans = Sweeps().feed(radials([*around, *around[-2::-1], *around[1:]])).finish()
+    assert sectors(scans) == [(170, 190), (-190, -175), (175, 190)]
+    assert [scan.cut_off for scan in scans] == [0, 0, 0]
+
+
+def test_a_radar_that_changes_its_tilt_with_each_sweep_has_its_ends_compared_all_the_same() -> None:
+    sweeps = Sweeps()
+    for k, angles in enumerate([FULL, FULL, FULL[:-4], FULL, FULL]):
+        sweeps.feed(radials(angles, tilt_deg=float(k % 2)))
+    assert [scan.cut_off for scan in sweeps.finish()] == [0, 0, 4, 0, 0]
