@@ -130,6 +130,8 @@ class Monitor:
             )
         if scan.missing:
             reasons.append(f"{scan.missing} radials are missing inside the sweep")
+        if scan.cut_off:
+            reasons.append(f"{scan.cut_off} radials at the ends of the sweep before are missing in this one")
         if scan.repeated:
             reasons.append(f"the scan angle did not change on {scan.repeated} of {len(scan.time_ns)} radials")
         if scan.beyond_limits.any():

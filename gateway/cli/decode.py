@@ -4,8 +4,6 @@ from typing import Annotated
 
 import typer
 
-WIDEST = 200  # a table for a report is as wide as it must be, whatever the terminal
-
 
 def decode_429(
     words: Annotated[list[str], typer.Argument(help="32-bit words in hexadecimal, bit 1 the least significant")],
@@ -13,10 +11,11 @@ def decode_429(
     orientation: Annotated[str, typer.Option(help="wire or label_swapped")] = "wire",
 ) -> None:
     """Explain ARINC 429 words."""
+    from gateway.console import print_table
     from gateway.explain import explain_429
 
     for word in words:
-        _print(("field", "bits", "code", "meaning"), explain_429(word, definitions, orientation))
+        print_table(("field", "bits", "code", "meaning"), explain_429(word, definitions, orientation))
 
 
 def decode_708(
@@ -24,17 +23,7 @@ def decode_708(
     profile: Annotated[str, typer.Option(help="arinc708, arinc708a, wxr2100_6bit, or a TOML file")] = "arinc708",
 ) -> None:
     """Explain an ARINC 708 radar word."""
+    from gateway.console import print_table
     from gateway.explain import explain_708
 
-    _print(("field", "bits", "code", "value", "unit", "note"), explain_708(word, profile))
-
-
-def _print(columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
-    from rich.box import MARKDOWN
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(*columns, box=MARKDOWN)
-    for row in rows:
-        table.add_row(*row)
-    Console(width=WIDEST).print(table)
+    print_table(("field", "bits", "code", "value", "unit", "note"), explain_708(word, profile))
