@@ -187,6 +187,12 @@ def _set(file: _File, name: str) -> Definitions:
     table = file.tables[name]
     if not isinstance(table, dict) or not {"equipment_id", "rows"} <= table.keys() <= SET_KEYS:
         raise DefinitionError(f"{file.path} [{name}]: a set has equipment_id, rows and perhaps extends, nothing else")
+    if type(table["equipment_id"]) is not int or not 0 <= table["equipment_id"] <= 0xFFF:
+        raise DefinitionError(
+            f"{file.path} [{name}]: equipment_id is a number from 0x000 to 0xFFF, as label 377 has it"
+        )
+    if not isinstance(table["rows"], list):
+        raise DefinitionError(f"{file.path} [{name}]: rows is a list of {{ label = ..., name = ..., ... }}")
     labels: dict[int, Definition] = {}
     written: Counter[object] = Counter()
     for row in table["rows"]:

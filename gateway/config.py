@@ -22,6 +22,8 @@ from decoders.profiles import Profile, load_profile, parse_profile
 from gateway.errors import GatewayError
 from monitor.settings import MonitorSettings
 
+OUR_NAMES = ("core", "host", "journal", "radar")  # of what tells events beside the adapters
+
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -98,10 +100,16 @@ class ChannelConfig(_Section):
     )
 
 
+def _not_ours(name: str) -> str:
+    if name in OUR_NAMES:
+        raise ValueError(f"{name!r} is what the gateway calls a part of itself: choose another name")
+    return name
+
+
 class AdapterConfig(_Section):
     """One bridge: its name in the recording and where it is."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9_-]+$")
+    name: Annotated[str, AfterValidator(_not_ours)] = Field(pattern=r"^[A-Za-z0-9_-]+$")
     source: str = Field(
         pattern=r"^[a-z0-9]+:.+", description="serial:DEVICE, serial:socket://..., serial:rfc2217://..."
     )

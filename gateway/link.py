@@ -13,7 +13,7 @@ from decoders.arinc429 import JoinRule
 from decoders.definitions import Definitions, for_equipment, load_definitions
 from decoders.health429 import EQUIPMENT, BusHealth
 from decoders.profiles import Profile
-from decoders.racklink import ChannelCount, Framer, Hello, Packet
+from decoders.racklink import ChannelCount, Framer, Hello, Packet, words429
 from gateway.config import AdapterConfig, definitions_of, profile_of
 
 SEQUENCE_RANGE = 1 << 32
@@ -33,11 +33,16 @@ class Channel429:
 
     definitions: Definitions
     health: BusHealth
+    kind: int
     orientation: str = "wire"
     join_rule: JoinRule = "concatenate"
     delays_ns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(256, np.int64))  # by label
 
     packet_type: ClassVar[int] = f.WORDS_429
+
+    def reads(self, definitions: Definitions, orientation: str, kind: int) -> bool:
+        """Whether it is read in this way already."""
+        return (self.definitions, self.orientation, self.kind) == (definitions, orientation, kind)
 
     @property
     def role(self) -> str:
@@ -100,12 +105,15 @@ class Link:
             else:
                 self.counters["channels_of_unknown_kind"] += 1
 
-    def identify(self, number: int, words: NDArray[np.uint32]) -> str | None:
+    def identify(self, packet: Packet) -> str | None:
         """Take a channel that nobody announced by its own equipment label (377); return the set it is read by now.
 
         Label 377 is the same in both orientations. Two normal words must say the same before they are believed.
         """
-        parts = arinc429.unpack(words)
+        number = packet.channel
+        if number in self.channels or packet.type != f.WORDS_429 or packet.flags & SPOILT:
+            return None
+        parts = arinc429.unpack(words429(packet).words)
         said = parts.data[(parts.label == EQUIPMENT) & parts.parity_ok & (parts.ssm == 0)] & 0xFFF
         for equipment in said.tolist():
             name = for_equipment(equipment & 0xFF)
@@ -122,9 +130,16 @@ class Link:
         delays_ns = np.zeros(256, np.int64)
         for label, delay_ms in configured.delays_ms.items() if configured else ():
             delays_ns[int(label, 8)] = round(delay_ms * 1e6)
+        for row in definitions.labels.values():  # a remainder is as old as what it belongs to
+            if row.fine_of is not None:
+                delays_ns[row.label] = delays_ns[row.fine_of]
+        before = self.channels.get(number)
+        if isinstance(before, Channel429) and before.reads(definitions, orientation, kind):
+            return  # a bridge says the same again every few seconds, and the health of the bus goes on
         self.channels[number] = Channel429(
             definitions,
             BusHealth(definitions, orientation, kind),
+            kind,
             orientation,
             configured.join_rule if configured else "concatenate",
             delays_ns,

@@ -62,7 +62,7 @@ class Pipeline:
         self._quiet: set[str] = set()
         self._users: dict[str, tuple[tuple[str, int], int]] = {}  # by role: adapter and channel, and when last heard
         self._unused: dict[tuple[str, int], str] = {}  # why a channel is not used, told already
-        self._doubted: set[str] = set()  # quantities whose coarse and fine words seem to be joined by the wrong rule
+        self._doubted: set[str] = set()  # quantities whose words seem to be read in a wrong way, told already
         self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
         self._last: Record | None = None
         if before:
@@ -148,11 +148,7 @@ class Pipeline:
         """
         here, now_ns = (record.adapter, packet.channel), record.stamp.monotonic_ns
         channel = link.channels.get(packet.channel)
-        if (
-            channel is None
-            and packet.type == f.WORDS_429
-            and (name := link.identify(packet.channel, words429(packet).words))
-        ):
+        if name := link.identify(packet):
             reason = f"label 377 says what channel {packet.channel} is: read as {name} from now on"
             yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "IDENTIFIED", reason)
             return False
@@ -290,11 +286,11 @@ class Pipeline:
                 if source == RADAR and self._monitor:
                     silence = self._monitor.unavailable(self._scans.skip(), [f"radar: {reason}"])
                     yield self._verdict(silence, self._monitor, record)
-        for quantity, doubt in self._aircraft.join_doubts().items():
+        for quantity, doubt in self._aircraft.doubts().items():
             if quantity not in self._doubted:
                 self._doubted.add(quantity)
                 self._troubles[quantity] = f"degraded: {quantity}: {doubt}"
-                yield StatusEvent(*stamp, quantity, "JOIN_RULE", doubt)
+                yield StatusEvent(*stamp, quantity, "STATE_DOUBT", doubt)
         yield self._state(record)
 
     def _quiet_reason(self, source: str, silent_ns: int, record: Tick) -> str:

@@ -159,6 +159,7 @@ class Aircraft:
     tracks: dict[str, Track] = field(default_factory=lambda: {q.name: Track(q) for q in QUANTITIES})
     utc: UtcClock = field(default_factory=UtcClock)
     _owners: dict[str, int] = field(default_factory=dict)
+    _strange: dict[str, str] = field(default_factory=dict)
     _halves: dict[str, _Half] = field(default_factory=dict)
     _joins: Mapping[str, JoinCheck] = field(default_factory=lambda: {axis.quantity.name: JoinCheck() for axis in AXES})
 
@@ -184,9 +185,9 @@ class Aircraft:
             elif label in UTC_LABELS and equipment in GNSS:
                 self.utc.feed(int(time_ns[k]), int(words[k]), values, k, definitions)
 
-    def join_doubts(self) -> dict[str, str]:
-        """By quantity, why the rule that joins its coarse and fine words seems to be the wrong one."""
-        return {name: doubt for name, check in self._joins.items() if (doubt := check.doubt())}
+    def doubts(self) -> dict[str, str]:
+        """By quantity, why its words seem to be read in a wrong way: the rule that joins them, or their units."""
+        return self._strange | {name: doubt for name, check in self._joins.items() if (doubt := check.doubt())}
 
     def _take(
         self,
@@ -199,6 +200,12 @@ class Aircraft:
     ) -> None:
         definition = definitions.labels.get(source.label)
         if definition is None or (source.bits and source.bits not in definition.fields):
+            return
+        if definition.units not in SI:
+            self._strange[source.quantity.name] = (
+                f"label {source.label:03o} of {definitions.name} is in {definition.units!r}: "
+                f"give it in one of {', '.join(sorted(SI))}"
+            )
             return
         if source.bits:
             given = arinc429.field(words, definition, source.bits).astype(np.float64)

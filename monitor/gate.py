@@ -16,11 +16,15 @@ MODES: Final = (
     "self test", "initialisation", "acquisition", "navigation", "altitude aiding", "reserved", "aided", "fault",
 )  # fmt: skip
 USABLE_MODES: Final = (3, 4, 6)
-NO_LIMIT_M: Final = 15.99 * NM_M  # label 130 at its end of scale: the receiver has no limit to give
 
 
-def position_doubts(aircraft: Aircraft, time_ns: NDArray[np.int64]) -> tuple[NDArray[np.bool_], list[str]]:
-    """At which times (n,) the position is not vouched for, and why, with the number of times."""
+def position_doubts(
+    aircraft: Aircraft, time_ns: NDArray[np.int64], largest_limit_nm: float
+) -> tuple[NDArray[np.bool_], list[str]]:
+    """At which times (n,) the position is not vouched for, and why, with the number of times.
+
+    The end of scale of label 130, 16 NM, stands for a receiver that has no limit to give.
+    """
     mode, limit, failure = (
         aircraft.tracks[quantity.name].at(time_ns) for quantity in (GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE)
     )
@@ -33,7 +37,9 @@ def position_doubts(aircraft: Aircraft, time_ns: NDArray[np.int64]) -> tuple[NDA
     for code in np.unique(kind[known]).tolist():
         if code not in USABLE_MODES:
             doubts[f"the GNSS receiver's mode is {MODES[code]}"] = known & (kind == code)
-    doubts["the GNSS receiver states no horizontal integrity limit"] = known & (limit.value >= NO_LIMIT_M)
+    loose = known & (limit.value > largest_limit_nm * NM_M)
+    largest = limit.value[loose].max(initial=0.0) / NM_M
+    doubts[f"the GNSS receiver's horizontal integrity limit is {largest:.2f} NM, above {largest_limit_nm:g}"] = loose
     doubts["the GNSS receiver has detected a satellite failure"] = known & (failure.value > 0)
     reasons = [f"{why} on {np.count_nonzero(at)} of {len(time_ns)} radials" for why, at in doubts.items() if at.any()]
     return np.logical_or.reduce(list(doubts.values())), reasons

@@ -119,7 +119,7 @@ class Monitor:
             if row.any()
         ]
         if self.settings.position_gate:
-            doubtful, doubts = position_doubts(aircraft, times)
+            doubtful, doubts = position_doubts(aircraft, times, self.settings.largest_integrity_limit_nm)
             usable &= ~doubtful
             reasons += doubts
         polar = usable & (np.abs(found[0].value) > HIGHEST_LATITUDE_DEG)

@@ -44,7 +44,8 @@ class UtcClock:
             return
         self._parts[label] = time_ns, float(values.value[k])
         if label == TIME:
-            self._precise = bool(arinc429.field([word], definitions.labels[TIME], "precise")[0])
+            row = definitions.labels[TIME]
+            self._precise = "precise" in row.fields and bool(arinc429.field([word], row, "precise")[0])
         if label != DATE:
             self._complete(time_ns)
 

@@ -83,6 +83,9 @@ def test_a_set_that_extends_another_replaces_labels_and_keeps_the_rest(tmp_path:
         ("[a]\nequipment_id = 1\nrows = []\nrowz = []", "a set has equipment_id"),
         ("[a]\nequipment_id = 1\nrows = [7]", "7 is no row"),
         ("a = ", "is no TOML"),
+        ("[a]\nequipment_id = '0x0B'\nrows = []", "equipment_id is a number"),
+        ("[a]\nequipment_id = -5\nrows = []", "equipment_id is a number"),
+        ("[a]\nequipment_id = 11\nrows = 5", "rows is a list"),
     ],
 )
 def test_a_file_that_is_not_one_set_is_refused(text: str, reason: str, tmp_path: Path) -> None:

@@ -1,8 +1,6 @@
 """What a bridge says of itself, and what it lost."""
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from decoders import formats as f
@@ -10,6 +8,7 @@ from decoders.profiles import load_profile
 from decoders.racklink import ChannelCount, Framer, Hello, HelloChannel, Packet
 from gateway.config import AdapterConfig
 from gateway.link import Channel429, Channel708, Link
+from simulators import racklink
 from tests.decoders.bus import word429
 
 
@@ -121,15 +120,16 @@ def test_all_counters_hold_the_framers_too() -> None:
     assert counters["packets"] == 1
 
 
-def equipment_words(*equipment: int, odd: bool = True) -> NDArray[np.uint32]:
-    return np.array([word429(0o377, {11: (number, 12)}, odd=odd) for number in equipment], np.uint32)
+def equipment_words(*equipment: int, odd: bool = True, ssm: int = 0, flags: int = 0) -> Packet:
+    words = [word429(0o377, {11: (number, 12)}, ssm, odd) for number in equipment]
+    return Packet(f.WORDS_429, 3, flags, 0, 0, racklink.words_429([0] * len(words), words))
 
 
 def test_a_channel_that_nobody_announced_is_taken_by_its_own_equipment_label_said_twice() -> None:
     link = make()
-    assert link.identify(3, equipment_words(0x00B)) is None
-    assert link.identify(3, equipment_words(0x004, 0x00B)) is None
-    assert link.identify(3, equipment_words(0x00B)) == "gnss_743a"
+    assert link.identify(equipment_words(0x00B)) is None
+    assert link.identify(equipment_words(0x004, 0x00B)) is None
+    assert link.identify(equipment_words(0x00B)) == "gnss_743a"
     channel = link.channels[3]
     assert isinstance(channel, Channel429)
     assert channel.definitions.name == "gnss_743a"
@@ -137,9 +137,10 @@ def test_a_channel_that_nobody_announced_is_taken_by_its_own_equipment_label_sai
 
 def test_neither_damaged_nor_unknown_equipment_labels_take_a_channel() -> None:
     link = make()
-    assert link.identify(3, equipment_words(0x00B, 0x00B, odd=False)) is None
-    assert link.identify(3, equipment_words(0x0FE, 0x0FE)) is None
-    assert link.identify(3, np.array([word429(0o377, {11: (0x00B, 12)}, ssm=1)] * 2, np.uint32)) is None
+    assert link.identify(equipment_words(0x00B, 0x00B, odd=False)) is None
+    assert link.identify(equipment_words(0x0FE, 0x0FE)) is None
+    assert link.identify(equipment_words(0x00B, 0x00B, ssm=1)) is None
+    assert link.identify(equipment_words(0x00B, 0x00B, flags=f.FLAG_WORD_LENGTH)) is None
     assert link.channels == {}
 
 

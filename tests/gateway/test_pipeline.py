@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from decoders import formats as f
 from gateway.config import RackConfig, check_config
+from gateway.errors import GatewayError
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
 from gateway.pipeline import Pipeline
 from gateway.records import Note, Record
@@ -398,7 +400,7 @@ def test_a_position_joined_by_the_wrong_rule_is_told_and_degrades_the_next_verdi
         coarse, fine = divmod(steps, 2048)
         words = [word429(0o110, {9: (-coarse & 0x1FFFFF, 21)}, 3), word429(0o120, {18: (fine, 11)}, 3)]
         records += [raw(2 * k + 1, k, bridge.words(GNSS, k, words)), tick(2 * k + 2, k + 0.5)]
-    (told,) = [event for event in only(StatusEvent, feed(pipeline, *records)) if event.state == "JOIN_RULE"]
+    (told,) = [event for event in only(StatusEvent, feed(pipeline, *records)) if event.state == "STATE_DOUBT"]
     assert told.adapter == "latitude_deg"
     assert "set join_rule of the channel" in told.reason
     (verdict,) = only(IntegrityEvent, feed(pipeline, raw(99, 30, sweep(bridge, 30))))
@@ -486,3 +488,24 @@ def test_a_command_of_before_the_clock_restarted_is_forgotten() -> None:
     stream = bridge.hello(100) + panel(bridge, 100.0, 3.0) + bridge.radar(0.1, radial(0)) + bridge.radar(1.6, radial(1))
     told = only(StatusEvent, feed(pipeline, raw(1, 0, stream)))
     assert [event.state for event in told] == ["CLOCK_RESTARTED"]
+
+
+def test_units_that_the_state_cannot_convert_are_told_and_break_nothing(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(
+        "[mine]\nequipment_id = 0x00B\nrows = [{ label = '076', name = 'Height', encoding = 'bnr', bits = [9, 28], "
+        "range = 131072, lsb = 0.125, units = 'feet', source = 's', confidence = 'c' },"
+        " { label = '150', name = 'UTC', encoding = 'time', source = 's', confidence = 'c' }]"
+    )
+    channels = {GNSS: {"kind": "arinc429", "definitions": str(tmp_path / "mine.toml")}}
+    rack = check_config({"adapters": [{"name": "bridge", "source": "serial:x", "channels": channels}]}, "test")
+    bridge, pipeline = Bridge(), Pipeline(rack, None)
+    words = [word429(0o076, {9: (800, 21)}, ssm=3), word429(0o150, {}, ssm=3)]
+    events = feed(pipeline, raw(1, 0, bridge.words(GNSS, 0, words)), tick(2, 1.0))
+    (told,) = [event for event in only(StatusEvent, events) if event.state == "STATE_DOUBT"]
+    assert (told.adapter, told.reason[:31]) == ("height_m", "label 076 of mine is in 'feet':")
+
+
+@pytest.mark.parametrize("name", ["radar", "core", "host", "journal"])
+def test_no_adapter_can_be_named_like_a_part_of_the_gateway(name: str) -> None:
+    with pytest.raises(GatewayError, match="choose another name"):
+        check_config({"adapters": [{"name": name, "source": "serial:x"}]}, "test")
