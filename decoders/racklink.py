@@ -9,7 +9,6 @@ import struct
 import zlib
 from collections.abc import Callable
 from functools import cache
-from itertools import islice
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -172,11 +171,12 @@ class Framer:
         whole = None if overlong else _unstuffed(run)
         if isinstance(whole, Packet) or whole == "unknown_version":
             return self._account(whole, len(run) + 1)
-        for start in islice(PACKET_START.finditer(run, 0 if overlong else 1), MOST_STARTS):
-            packet = _unstuffed(run[start.start() :])
+        starts = [found.start() for found in PACKET_START.finditer(run, 0 if overlong else 1)]
+        for start in reversed(starts[-MOST_STARTS:]):  # whatever was cut off before it, the good packet comes last
+            packet = _unstuffed(run[start:])
             if isinstance(packet, Packet):
-                self._account(whole, start.start())
-                return self._account(packet, len(run) - start.start() + 1)
+                self._account(whole, start)
+                return self._account(packet, len(run) - start + 1)
         return self._account(whole, len(run) + 1)
 
     def _account(self, outcome: "Packet | Fault | None", size: int) -> list[Packet]:

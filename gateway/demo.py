@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 import rasterio
 from pyproj import Geod
+from rasterio.errors import RasterioError
 from rasterio.transform import Affine
 from rich.box import SIMPLE
 from rich.console import Console
@@ -102,7 +103,10 @@ def fly(out: Path, seed: int, speed: float, stop: Stop) -> None:
     except OSError as error:
         raise GatewayError(f"cannot write to {out}: {error.strerror}; choose another directory with --out") from error
     true_terrain = BUILT_IN_TERRAIN["white_mountains"]
-    shifted = shift_terrain(true_terrain, out / "shifted_500m_east.tif", east_m=SHIFT_EAST_M)
+    try:
+        shifted = shift_terrain(true_terrain, out / "shifted_500m_east.tif", east_m=SHIFT_EAST_M)
+    except RasterioError as error:
+        raise GatewayError(f"cannot write the shifted terrain to {out}: is the disk full?") from error
     failing = ({"name": "gnss_no_computed_data", "start_s": GNSS_FAILS_S},)
     legs = [
         Leg("true", "true terrain", true_terrain, "ok"),

@@ -69,6 +69,7 @@ class Link:
     counters: Counter[str] = field(default_factory=Counter)
     losses: Counter[str] = field(default_factory=Counter)  # since the last verdict
     channels: dict[int, Channel429 | Channel708] = field(default_factory=dict)
+    _last: Packet | None = None
     _next_sequence: int | None = None
     _said: dict[int, int] = field(default_factory=dict)  # by channel, its equipment as its last label 377 said
     _lost: dict[int, int] = field(default_factory=dict)  # by channel, as the last heartbeat said
@@ -145,8 +146,15 @@ class Link:
             delays_ns,
         )
 
-    def count(self, packet: Packet) -> None:
-        """Count the packet, the flags it carries, and the packets missing before it."""
+    def count(self, packet: Packet) -> bool:
+        """Count the packet, the flags it carries, and the packets missing before it; whether it is a new one.
+
+        The very same packet once more, as a network may deliver it, is counted and must not be used again.
+        """
+        if packet == self._last:
+            self.counters["packets_repeated"] += 1
+            return False
+        self._last = packet
         self.counters["packets"] += 1
         for bit, name in FLAG_NAMES.items():
             if packet.flags & bit:
@@ -161,6 +169,7 @@ class Link:
             else:
                 self.counters["sequence_restarts"] += 1
         self._next_sequence = (packet.sequence + 1) % SEQUENCE_RANGE
+        return True
 
     def heartbeat(self, counts: tuple[ChannelCount, ...]) -> None:
         """Take what the bridge says it lost itself, and count what is new of it."""

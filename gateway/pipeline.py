@@ -113,7 +113,8 @@ class Pipeline:
         self._chunk[record.adapter] = record.stamp.monotonic_ns
         for packet in link.framer.feed(record.data):
             yield from self._hear(record.adapter, record)
-            link.count(packet)
+            if not link.count(packet):
+                continue
             try:
                 yield from self._packet(link, packet, record)
             except MalformedBody:

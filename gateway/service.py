@@ -1,5 +1,6 @@
 """The gateway as a whole: adapters, journal and core, started and stopped in the order that loses nothing."""
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -80,9 +81,9 @@ class Service:
     def run_until(self, stop: threading.Event, seconds: float | None = None) -> None:
         """Run until `stop` is set, the time is over, or a thread that the gateway needs has died."""
         self.start()
-        deadline = time.monotonic() + seconds if seconds is not None else None
+        deadline = math.inf if seconds is None else time.monotonic() + seconds
         while not stop.is_set() and not self.broken.is_set():
-            if deadline is not None and time.monotonic() >= deadline:
+            if not time.monotonic() < deadline:  # written so that no number of seconds runs for ever
                 break
             stop.wait(POLL_S)
         self.stop()

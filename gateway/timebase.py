@@ -7,6 +7,7 @@ add, and is let up slowly so that drifting clocks are followed.
 
 DRIFT_PER_S = 1e-4  # what two quartz clocks may drift apart
 RESTART_NS = 1_000_000_000  # a device time that steps back this far is a clock that began anew
+LEAP_NS = 60_000_000_000  # and so is one that runs ahead of the host's clock this far between two packets
 
 
 class Timebase:
@@ -23,7 +24,8 @@ class Timebase:
             self._reference = adapter
         seen = host_ns - device_ns
         offset, last_host_ns, last_device_ns = self._clocks.get(adapter, (seen, host_ns, device_ns))
-        if device_ns < last_device_ns - RESTART_NS:
+        ahead_ns = (device_ns - last_device_ns) - (host_ns - last_host_ns)
+        if device_ns < last_device_ns - RESTART_NS or ahead_ns > LEAP_NS:
             self.restarts += 1
             offset = seen
         offset = min(seen, offset + (host_ns - last_host_ns) * DRIFT_PER_S)

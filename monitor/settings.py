@@ -1,8 +1,8 @@
 """What the monitor can be told: every option with its unit, its bounds and a sentence."""
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 HeightSource = Literal["076", "370"]
 
@@ -53,6 +53,12 @@ class MonitorSettings(BaseModel):
         0.3, gt=0, le=16, description="horizontal integrity limit (130) up to which a position is precise enough, NM"
     )
     control_delay_s: float = Field(1.0, ge=0, le=60, description="what the radar may take to do what its panel asks")
+
+    @model_validator(mode="after")
+    def _some_shadow_has_a_size(self) -> Self:
+        if self.maximum_size is not None and self.maximum_size < self.minimum_size:
+            raise ValueError(f"maximum_size {self.maximum_size} is below minimum_size {self.minimum_size}")
+        return self
 
     @property
     def pairs_needed(self) -> int:

@@ -3,6 +3,7 @@
 import contextlib
 import errno
 import select
+import socket
 from queue import Empty
 from typing import Any
 from urllib.parse import urlsplit
@@ -15,6 +16,7 @@ from gateway.errors import GatewayError
 LONGEST_WAIT_S = 0.2  # so that a silent line still notices the order to stop
 LARGEST_READ = 65_536
 REMOTE = ("socket", "rfc2217")
+KEEP_ALIVE = {socket.TCP_KEEPIDLE: 5, socket.TCP_KEEPINTVL: 2, socket.TCP_KEEPCNT: 3}  # told to be dead after 11 s
 
 MENDS = {
     errno.ENOENT: "no such device: plug it in, or see `ls /dev/serial/by-id` for its name",
@@ -43,7 +45,12 @@ class SerialPort:
         if self._telnet:
             return _read_telnet(self._line)
         ready, _, _ = select.select([self._line], [], [], LONGEST_WAIT_S)
-        return bytes(self._line.read(LARGEST_READ)) if ready else b""
+        try:
+            return bytes(self._line.read(LARGEST_READ)) if ready else b""
+        except serial.SerialException as error:
+            if "returned no data" not in str(error):  # how pyserial words a line that has gone
+                raise
+            raise serial.SerialException("unplugged, or its other end is closed") from error
 
     def close(self) -> None:
         """Close the line; an unplugged one may object in many ways, none of which matters any more."""
@@ -70,9 +77,19 @@ class SerialAdapter:
             # pyserial throws away what has come while it was opening, and with it a bridge's hello.
             line.reset_input_buffer = line._reset_input_buffer = _keep  # type: ignore[method-assign, attr-defined]
             line.open()
+            _keep_alive(line)
         except (OSError, ValueError) as error:
             raise GatewayError(f"serial line {self.address}: {MENDS.get(_number(error), error)}") from error
         return SerialPort(line, telnet=telnet)
+
+
+def _keep_alive(line: Any) -> None:
+    """Have the kernel ask whether a TCP peer is still there: we only listen, and would wait for a dead one for ever."""
+    peer = getattr(line, "_socket", None)
+    if peer is not None:
+        peer.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for option, value in KEEP_ALIVE.items():
+            peer.setsockopt(socket.IPPROTO_TCP, option, value)
 
 
 def _number(error: Exception) -> int:

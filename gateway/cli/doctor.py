@@ -9,15 +9,17 @@ import typer
 def doctor(record: Annotated[Path, typer.Option(help="where recordings are to go")] = Path()) -> None:
     """Check this machine and print the command that mends what it lacks; exit 1 if it lacks anything."""
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
 
     from gateway.doctor import examine
 
-    table = Table("check", "", "seen", "mend")
+    table = Table("check", "", Column("seen", overflow="fold"))
     findings = examine(record)
     for finding in findings:
-        mark = "[green]good[/]" if finding.good else "[red]lacks[/]"
-        table.add_row(finding.check, mark, finding.seen, "" if finding.good else finding.mend)
+        table.add_row(finding.check, "[green]good[/]" if finding.good else "[red]lacks[/]", finding.seen)
     Console().print(table)
-    if not all(finding.good for finding in findings):
+    lacking = [finding for finding in findings if not finding.good]
+    for finding in lacking:  # whole lines, to be copied from any terminal
+        typer.echo(f"{finding.check}: {finding.mend}")
+    if lacking:
         raise typer.Exit(1)

@@ -15,7 +15,7 @@ def info(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
 
     stop = Stop()  # before the imports that take their time
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
 
     from gateway.console import clock
     from gateway.metadata import recorded_config
@@ -33,7 +33,7 @@ def info(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
         raw_bytes += len(record.data) if isinstance(record, Raw) else 0
         for _ in pipeline.feed(record):
             pass
-    table = Table(title=str(recording), show_header=False)
+    table = Table("", Column(overflow="fold"), title=str(recording), show_header=False)
     table.add_row("size", f"{recording.stat().st_size} bytes, {raw_bytes} of them from the buses")
     if first and last:
         seconds = (last.monotonic_ns - first.monotonic_ns) / 1e9

@@ -15,7 +15,7 @@ def run(
     record: Annotated[Path | None, typer.Option(help="directory for the recording")] = None,
     calibration: Annotated[Path | None, typer.Option(help="calibration file of the radar")] = None,
     json: Annotated[bool, typer.Option("--json", help="events as JSON lines")] = False,
-    seconds: Annotated[float | None, typer.Option("--for", help="stop after so many seconds")] = None,
+    seconds: Annotated[float | None, typer.Option("--for", min=0, help="stop after so many seconds")] = None,
     wait: Annotated[bool, typer.Option("--wait", help="start although a device is not there yet")] = False,
 ) -> None:
     """Listen to the buses, record every byte, and judge the terrain live; Ctrl-C or SIGTERM ends it in good order."""

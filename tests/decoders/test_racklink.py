@@ -205,12 +205,18 @@ def test_a_run_full_of_false_starts_costs_a_bounded_number_of_attempts(
     assert (counters["skipped"], counters["bad_crc"] + counters["oversize"]) == (len(run), 1)
 
 
-def test_a_packet_behind_as_many_false_starts_as_are_tried_is_lost_and_costs_no_other() -> None:
-    packets, counters = fed([FALSE_START * MOST_STARTS + GOOD_FRAME])  # a run is not searched at its own start
-    assert (packets, counters["skipped"]) == ([GOOD], len(FALSE_START) * MOST_STARTS)
-    garbage = FALSE_START * (MOST_STARTS + 1) + GOOD_FRAME
-    packets, counters = fed([garbage + GOOD_FRAME])
-    assert (packets, counters["skipped"], counters["bad_crc"]) == ([GOOD], len(garbage), 1)
+def test_a_packet_behind_any_number_of_false_starts_is_found() -> None:
+    for many in (1, MOST_STARTS, 3 * MOST_STARTS, 10_000):
+        packets, counters = fed([FALSE_START * many + GOOD_FRAME])
+        assert (packets, counters["skipped"]) == ([GOOD], len(FALSE_START) * many)
+
+
+def test_a_packet_that_holds_as_many_false_starts_as_are_tried_is_lost_behind_garbage_and_costs_no_other() -> None:
+    body = b"\5\1" * (MOST_STARTS + 1)
+    assert len(fed([frame(packet_bytes(body))])[0]) == 1
+    run = b"garbage" + frame(packet_bytes(body))
+    packets, counters = fed([run + GOOD_FRAME])
+    assert (packets, counters["skipped"], counters["bad_crc"] + counters["bad_cobs"]) == ([GOOD], len(run), 1)
 
 
 @pytest.mark.parametrize("endless", [b"\7", FALSE_START, b"\xff\1", b"\0"])

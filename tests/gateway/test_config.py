@@ -164,3 +164,9 @@ def test_a_profile_file_that_is_not_there_or_no_text_is_named(tmp_path: Path) ->
     (own_files(tmp_path) / "radar.toml").write_bytes(b"\xff")
     with pytest.raises(GatewayError, match=r"radar_profile: .*files/radar\.toml is no TOML"):
         load(tmp_path, OWN_FILES)
+
+
+def test_sizes_of_shadows_that_exclude_each_other_are_refused() -> None:
+    sizes = {"minimum_size": 10, "maximum_size": 5}
+    with pytest.raises(GatewayError, match="maximum_size 5 is below minimum_size 10"):
+        check_config({"adapters": [{"name": "a", "source": "serial:x"}], "monitor": sizes}, "test")

@@ -36,7 +36,6 @@ def count(link: Link, *sequences: int, flags: int = 0) -> Link:
         ((2**32 - 2, 2**32 - 1, 0, 1), 0, 0),
         ((2**32 - 2, 3), 4, 0),
         ((1000, 1001, 0, 1), 0, 1),
-        ((5, 5), 0, 1),
     ],
 )
 def test_gaps_wraps_and_restarts_of_the_sequence(sequences: tuple[int, ...], lost: int, restarts: int) -> None:
@@ -50,6 +49,12 @@ def test_each_flag_is_counted_by_its_name() -> None:
     link = count(make(), 0, flags=0x1F)
     names = ("fifo_overflow", "parity_error", "coding_error", "word_length_error", "sync_error")
     assert [link.counters[name] for name in names] == [1] * 5
+
+
+def test_the_same_packet_once_more_is_counted_apart_and_not_used_again() -> None:
+    link, packet = make(), Packet(f.HEARTBEAT, 0, 0, 7, 1000, b"body")
+    assert [link.count(packet), link.count(packet), link.count(packet._replace(body=b"other"))] == [True, False, True]
+    assert (link.counters["packets"], link.counters["packets_repeated"], link.counters["packets_lost"]) == (2, 1, 0)
 
 
 def test_losses_are_told_once() -> None:

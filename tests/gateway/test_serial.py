@@ -2,6 +2,7 @@
 
 import os
 import random
+import select
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -104,6 +105,24 @@ def test_a_socket_gives_every_byte_even_those_just_before_its_end(server: socket
     assert read_to_the_end(port) == DATA
     sender.join(10)
     port.close()
+
+
+def test_the_kernel_asks_whether_a_silent_peer_is_still_there(server: socket.socket) -> None:
+    port = open_port(address_of(server))
+    peer = port._line._socket  # type: ignore[attr-defined]
+    assert peer.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
+    options = (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
+    assert [peer.getsockopt(socket.IPPROTO_TCP, option) for option in options] == [5, 2, 3]
+    port.close()
+
+
+def test_a_line_whose_device_has_gone_is_said_to_be_unplugged(monkeypatch: pytest.MonkeyPatch) -> None:
+    with PtyOutlet() as outlet:
+        port = open_port(outlet.path)
+        monkeypatch.setattr(select, "select", lambda *_: ([port], [], []))  # as the kernel says of a line that has gone
+        with pytest.raises(OSError, match="unplugged, or its other end is closed"):
+            port.read()
+        port.close()
 
 
 def test_a_silent_socket_gives_nothing_after_a_short_wait(server: socket.socket) -> None:

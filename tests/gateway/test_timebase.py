@@ -61,3 +61,12 @@ def test_a_bridge_that_restarts_is_aligned_anew_and_counted(restarted: str) -> N
             offsets[name] = device_ns + timebase.offset_ns(name, device_ns, true_ns)
     assert offsets["b"] == pytest.approx(offsets["a"], abs=100_000)
     assert timebase.restarts == 1
+
+
+def test_a_clock_that_leaps_ahead_of_the_host_began_anew_and_one_that_was_only_silent_did_not() -> None:
+    timebase = Timebase()
+    timebase.offset_ns("a", 0, 0)
+    timebase.offset_ns("a", 3600 * SECOND_NS, 3600 * SECOND_NS)
+    assert timebase.restarts == 0
+    timebase.offset_ns("a", 90_000 * SECOND_NS, 3601 * SECOND_NS)
+    assert timebase.restarts == 1
