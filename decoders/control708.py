@@ -10,9 +10,9 @@ from typing import Any, Final, NamedTuple
 
 from decoders import formats as f
 from decoders.arinc708 import GAIN_DB, RANGE_NM
-from decoders.definitions import Definition
+from decoders.definitions import Definition, DefinitionError, Definitions
 
-PANEL: Final = 0x00  # low byte of the equipment id of the panel's label sets
+WIDTHS: Final = {"mode": 3, "tilt": 7, "gain": 6, "range": 6}  # as in the radar's header; all else is one bit
 DIVISOR: Final = 20
 
 
@@ -45,6 +45,23 @@ READ: Final[dict[str, tuple[str, Callable[[int], float]]]] = {
     "range": ("range_nm", lambda code: float(RANGE_NM[code])),
     "vertical_profile": ("vertical_profile", bool),
 }
+
+
+def is_panel(definitions: Definitions) -> bool:
+    """Whether a label set is that of a control panel: one of its words asks for a mode and a tilt.
+
+    Raises DefinitionError for fields of another width than the radar's header has.
+    """
+    panel = any({"mode", "tilt"} <= row.fields.keys() for row in definitions.labels.values())
+    for row in definitions.labels.values() if panel else ():
+        for name in READ.keys() & row.fields.keys():
+            first, last = row.fields[name]
+            if last - first + 1 != WIDTHS.get(name, 1):
+                raise DefinitionError(
+                    f"[{definitions.name}] label {row.label:03o}: {name} has {last - first + 1} bits, "
+                    f"the radar's header {WIDTHS.get(name, 1)}"
+                )
+    return panel
 
 
 def decode(word: int, definition: Definition, before: Command | None = None) -> Command:

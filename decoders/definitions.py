@@ -6,7 +6,6 @@ Nothing here packs or unpacks a word: decoders and simulators read the same rows
 
 import re
 import tomllib
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -50,8 +49,20 @@ ENCODINGS: Final = {
     "clock": Encoding(frozenset(), "bcd", (11, 28), "min"),
     "iso5": Encoding(frozenset({"bits"}), "disc", units="text"),
 }
+NUMBER: Final = (int, Fraction, str)
+TYPES: Final[dict[str, Any]] = {
+    **dict.fromkeys(("label", "name", "encoding", "units", "ssm", "source", "confidence", "positive", "fine_of"), str),
+    **dict.fromkeys(("range", "lsb"), NUMBER),
+    "bits": (int, list),
+    "fields": dict,
+    "interval_ms": (int, Fraction, list),
+}
+WANTED: Final = {key: "text" if kind is str else "table" if kind is dict else "number" for key, kind in TYPES.items()}
+COMMENT_OR_TEXT: Final = re.compile(r"""'[^']*'|"(?:[^"\\]|\\.)*"|#.*""")
+HEADER: Final = re.compile(r"\[\[?([\w.-]+)\]\]?")
 LSB_OF_CLOCK: Final = Fraction(1, 10)
 CHARACTER_BITS: Final = 7  # of ISO alphabet 5
+POSITION: Final = ((9, 28), Fraction(180), (18, 28))  # bits and range of the coarse word, bits of the fine one
 ROW_NEEDS: Final = frozenset({"label", "name", "encoding", "source", "confidence"})
 ROW_MAY_HAVE: Final = frozenset({"ssm", "fields", "fine_of", "positive", "interval_ms"})
 SET_KEYS: Final = frozenset({"equipment_id", "extends", "rows"})
@@ -139,13 +150,27 @@ class _File(NamedTuple):
     tables: dict[str, Any]
     text: str
 
-    def where(self, name: str, label: object, occurrence: int = 0) -> str:
-        """File and line of a row, as editors take it, its set and its label."""
-        section = re.search(rf"^\[{re.escape(name)}\]\s*$(.*?)(?=^\[\w+\]\s*$|\Z)", self.text, re.MULTILINE | re.DOTALL)
-        start, end = section.span(1) if section else (0, len(self.text))
-        rows = list(re.finditer(rf"label\s*=\s*[\"']?{re.escape(str(label))}\b", self.text[start:end]))
-        line = self.text.count("\n", 0, start + rows[occurrence].start()) + 1 if occurrence < len(rows) else 1
-        return f"{self.path}:{line} [{name}] label {label}"
+    def where(self, name: str, label: object, row: int) -> str:
+        """File and line of a set's row, counted from 0, as editors take it, its set and its label."""
+        lines = _row_lines(self.text, name)
+        line = f":{lines[row]}" if row < len(lines) else ""
+        return f"{self.path}{line} [{name}] label {label}"
+
+
+def _row_lines(text: str, name: str) -> list[int]:
+    """The lines on which the rows of a set begin: its inline tables, or its headers [[name.rows]]."""
+    lines, inside, depth = [], False, 0
+    for number, line in enumerate(text.splitlines(), 1):
+        bare = COMMENT_OR_TEXT.sub("", line)
+        header = HEADER.fullmatch(bare.strip()) if not depth else None
+        if header:
+            inside = header[1] == name
+            if header[1] == f"{name}.rows":
+                lines.append(number)
+        for mark in bare if inside and not header else "":
+            lines += [number] if mark == "{" and depth == 1 else []
+            depth += (mark in "[{") - (mark in "]}")
+    return lines
 
 
 @cache
@@ -153,10 +178,10 @@ def _built_in() -> _File:
     file = _file(_text(LABELS_FILE), LABELS_FILE)
     defined: dict[tuple[int, str], str] = {}
     for name, table in file.tables.items():
-        for row in [] if "extends" in table else table["rows"]:
+        for k, row in enumerate([] if "extends" in table else table["rows"]):
             other = defined.setdefault((table["equipment_id"], row["label"]), name)
             if other != name:
-                where = file.where(name, row["label"])
+                where = file.where(name, row["label"], k)
                 raise DefinitionError(f"{where}: set {other} defines it for the same equipment: extend that set")
     return file
 
@@ -179,7 +204,7 @@ def _file(text: str, path: Path) -> _File:
     # Decimal fractions are kept exact: 0.1 and 4.096 have no exact float.
     try:
         return _File(path, tomllib.loads(text, parse_float=Fraction), text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # no TOML, or a number that is none
         raise DefinitionError(f"{path} is no TOML: {error}") from error
 
 
@@ -194,24 +219,28 @@ def _set(file: _File, name: str) -> Definitions:
     if not isinstance(table["rows"], list):
         raise DefinitionError(f"{file.path} [{name}]: rows is a list of {{ label = ..., name = ..., ... }}")
     labels: dict[int, Definition] = {}
-    written: Counter[object] = Counter()
-    for row in table["rows"]:
+    for k, row in enumerate(table["rows"]):
         if not isinstance(row, dict):
             raise DefinitionError(f"{file.path} [{name}]: {row!r} is no row; write {{ label = ..., name = ..., ... }}")
-        where = file.where(name, row.get("label", "?"), written[row.get("label")])
-        written[row.get("label")] += 1
+        where = file.where(name, row.get("label", "?"), k)
         definition = _definition(where, row)
         if definition.label in labels:
             raise DefinitionError(f"{where}: defined twice")
         labels[definition.label] = definition
-    inherited = _named(table["extends"]).labels if "extends" in table else {}
+    try:
+        inherited = _named(table["extends"]).labels if "extends" in table else {}
+    except ValueError as error:
+        raise DefinitionError(f"{file.path} [{name}] extends: {error}") from error
+    if not inherited and not labels:
+        raise DefinitionError(f"{file.path} [{name}]: a set has at least one row")
     whole = {**inherited, **labels}
-    for definition in labels.values():
-        _check_fine(file.where(name, f"{definition.label:03o}"), definition, whole)
+    for definition in whole.values():
+        _check_fine(f"{file.path} [{name}] label {definition.label:03o}", definition, whole)
     return Definitions(name, table["equipment_id"], whole)
 
 
 def _definition(where: str, row: dict[str, Any]) -> Definition:
+    _check_types(where, row)
     if row.get("encoding") not in ENCODINGS:
         raise DefinitionError(f"{where}: unknown encoding {row.get('encoding')!r}, use one of {', '.join(ENCODINGS)}")
     encoding = ENCODINGS[row["encoding"]]
@@ -267,6 +296,16 @@ def _exact(number: int | str | Fraction) -> Fraction:
     return Fraction(number)
 
 
+def _check_types(where: str, row: dict[str, Any]) -> None:
+    for key, value in row.items():
+        if not isinstance(value, TYPES.get(key, object)) or isinstance(value, bool):
+            raise DefinitionError(f"{where}: {key} is {value!r}, which is no {WANTED.get(key, 'value')}")
+    for key, bits in {"bits": row.get("bits", 9), **row.get("fields", {})}.items():
+        ends = [bits] if isinstance(bits, int) else bits
+        if not isinstance(ends, list) or not 1 <= len(ends) <= 2 or any(type(end) is not int for end in ends):
+            raise DefinitionError(f"{where}: {key} is {bits!r}: give a bit, or the first and the last as [11, 28]")
+
+
 def _check_keys(where: str, row: dict[str, Any], encoding: Encoding) -> None:
     needs = ROW_NEEDS | encoding.needs
     may_have = needs | ROW_MAY_HAVE | ({"bits"} if row["encoding"] == "disc" else frozenset())
@@ -296,6 +335,11 @@ def _check_fine(where: str, fine: Definition, labels: Mapping[int, Definition]) 
     if fine.fine_of is None:
         return
     coarse = labels.get(fine.fine_of)
+    if coarse and fine.units == "deg" and (coarse.bits, coarse.range, fine.bits) != POSITION:
+        raise DefinitionError(
+            f"{where}: a position is joined from bits 9 to 28 of +-180 degrees in label {fine.fine_of:03o} "
+            "and bits 18 to 28 here"
+        )
     if coarse is None or fine.encoding != "bnr_unsigned" or (fine.range, fine.units) != (coarse.lsb, coarse.units):
         raise DefinitionError(
             f"{where}: no remainder of label {fine.fine_of:03o}: its range must be that label's LSB, unsigned"

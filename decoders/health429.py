@@ -16,12 +16,16 @@ from decoders.definitions import Definitions
 from decoders.formats import KIND_429_LOW
 
 MOST_WORDS_PER_S: Final = {"high": 1e5 / 36, "low": 12.5e3 / 36}  # 36 bit times a word, its gap included
-TOO_FAST: Final = 0.8  # of the shortest interval, on average over a second
-TOO_SLOW: Final = 1.5  # of the longest
+# What begins a finding and what ends it lie apart, so that nothing on the edge is told every second.
+TOO_FAST: Final = (0.75, 0.9)  # of the shortest interval, on average between the words of a second or more
+TOO_SLOW: Final = (1.25, 1.1)  # of the longest
+STOPPED: Final = 3.0  # of the longest, and a second at least
+OFTEN: Final = 3  # words of a label before its silence means anything: a damaged label passes the parity too
 OVERLOAD: Final = 1.02  # of what the bus carries, for two clocks that differ
 EQUIPMENT: Final = 0o377
 ENOUGH_WORDS: Final = 100  # before reading order and parity are judged
-FEW, MOST = 0.2, 0.8
+FEW, MORE, MOST = 0.2, 0.4, 0.8  # shares of words
+BAD_PARITY: Final = (0.2, 0.1)
 SECOND_NS: Final = 1_000_000_000
 TURNED: Final = np.array([int(f"{label:08b}"[::-1], 2) for label in range(256)], np.uint8)
 
@@ -41,6 +45,7 @@ class _Rate:
     first_ns: int
     last_ns: int
     count: int = 0
+    ever: int = 0
 
 
 class BusHealth:
@@ -76,6 +81,7 @@ class BusHealth:
             rate = self._rates.setdefault(label, _Rate(at_ns, at_ns))
             rate.last_ns = at_ns
             rate.count += 1
+            rate.ever += 1
         for said in values.value[(values.label == EQUIPMENT) & (values.status == Status.NORMAL)].astype(int).tolist():
             reason = f"the box says it is equipment {said:03X}, it is read as {self._definitions.name}"
             yield from self._tell("equipment", said & 0xFF != self._definitions.equipment_id & 0xFF, reason)
@@ -97,33 +103,45 @@ class BusHealth:
     def _rate(self, label: int, rate: _Rate, now_ns: int) -> Iterator[Finding]:
         definition = self._definitions.labels.get(label)
         shortest, longest = definition.interval_ms if definition and definition.interval_ms else (0.0, None)
+        if rate.count > 1 and f"label {label:03o}" in self._wrong:  # the gap that was told is no interval
+            rate.first_ns, rate.count = rate.last_ns, 1
         if rate.count > 1:
             mean_ms = (rate.last_ns - rate.first_ns) / 1e6 / (rate.count - 1)
-            fast = f"label {label:03o} comes every {mean_ms:.1f} ms, {shortest:g} is the shortest interval"
-            yield from self._tell(f"rate of {label:03o}", mean_ms < TOO_FAST * shortest, fast)
+            said = f"label {label:03o} comes every {mean_ms:.1f} ms"
+            wrong = _beyond(-mean_ms, -TOO_FAST[0] * shortest, -TOO_FAST[1] * shortest)
+            yield from self._tell(f"rate of {label:03o}", wrong, f"{said}, {shortest:g} is the shortest interval")
+            if longest:
+                wrong = _beyond(mean_ms, TOO_SLOW[0] * longest, TOO_SLOW[1] * longest)
+                yield from self._tell(f"slowness of {label:03o}", wrong, f"{said}, {longest:g} is the longest interval")
             rate.first_ns, rate.count = rate.last_ns, 1
-        if longest:
+        if longest and rate.ever >= OFTEN:
             silent_ms = (now_ns - rate.last_ns) / 1e6
-            stale = f"label {label:03o} has not come for {silent_ms:.0f} ms, {longest:g} is the longest interval"
-            yield from self._tell(f"label {label:03o}", silent_ms > TOO_SLOW * longest, stale)
+            stopped = f"label {label:03o} has not come for {silent_ms:.0f} ms, {longest:g} is the longest interval"
+            yield from self._tell(f"label {label:03o}", silent_ms > max(STOPPED * longest, 1000.0), stopped)
 
     def _reading(self) -> Iterator[Finding]:
         good, bad = self._known["good"], self._known["bad parity"]
         noisy = f"parity is bad in {bad} of {good + bad} words: noise, or bits in another order"
-        yield from self._tell("parity", bad > FEW * (good + bad), noisy)
+        yield from self._tell("parity", _beyond(bad / (good + bad), *BAD_PARITY), noisy)
         if good:
             known, turned = self._known["known"] / good, self._known["known if turned"] / good
-            name = self._definitions.name
+            name, unclear = self._definitions.name, FEW <= known <= MORE
             order = (
                 f"{known:.0%} of the labels belong to {name}, {turned:.0%} if read the other way round: "
                 f"check the channel's orientation, which is {self._orientation!r}"
             )
-            yield from self._tell("orientation", known < FEW and turned > MOST, order)
+            yield from self._tell("orientation", None if unclear else known < FEW and turned > MOST, order)
             other = f"{known:.0%} of the labels belong to {name}: check the channel's definitions"
-            yield from self._tell("definitions", known < FEW and turned <= MOST, other)
+            yield from self._tell("definitions", None if unclear else known < FEW and turned <= MOST, other)
         self._known.clear()
 
-    def _tell(self, about: str, wrong: bool, reason: str) -> Iterator[Finding]:
-        if wrong != (about in self._wrong):
+    def _tell(self, about: str, wrong: bool | None, reason: str) -> Iterator[Finding]:
+        """Tell a change; None stands for neither right nor wrong, which changes nothing."""
+        if wrong is not None and wrong != (about in self._wrong):
             (self._wrong.add if wrong else self._wrong.discard)(about)
             yield Finding(about, wrong, reason if wrong else f"{about} is in order again")
+
+
+def _beyond(value: float, wrong_above: float, right_below: float) -> bool | None:
+    """Whether a value is wrong; None between the limit that begins a finding and the one that ends it."""
+    return True if value > wrong_above else False if value <= right_below else None

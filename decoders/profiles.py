@@ -16,7 +16,7 @@ HEADER_BITS: Final = 8 * HEADER_708_BYTES
 PROFILES_FILE: Final = Path(__file__).with_name("profiles.toml")
 BINS_AT_ONCE: Final = 32  # a kernel unpacks so many in one go
 
-Label = Annotated[int, Field(ge=0, le=0o377)]
+Label = Annotated[int, Field(strict=True, ge=0, le=0o377)]
 Colour = Annotated[str, Field(pattern=r"^#[0-9a-f]{6}$")]
 
 
@@ -32,10 +32,10 @@ class Profile:
     """
 
     name: str
-    word_bits: Annotated[int, Field(le=LONGEST_WORD_708_BITS)]
-    bins: Annotated[int, Field(ge=BINS_AT_ONCE, multiple_of=BINS_AT_ONCE)]
+    word_bits: Annotated[int, Field(strict=True, le=LONGEST_WORD_708_BITS)]
+    bins: Annotated[int, Field(strict=True, ge=BINS_AT_ONCE, multiple_of=BINS_AT_ONCE)]
     bits_per_bin: Literal[3, 6]
-    labels: tuple[Label, ...]
+    labels: Annotated[tuple[Label, ...], Field(min_length=1)]
     scan_angle_zero: Literal["nose", "tail"]
     scan_angle_sense: Literal["clockwise", "counterclockwise"]
     faults: Annotated[tuple[str, ...], Field(min_length=7, max_length=7)]

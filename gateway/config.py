@@ -17,6 +17,7 @@ from pydantic import (
     model_validator,
 )
 
+from decoders import control708
 from decoders.definitions import Definitions, load_definitions, parse_definitions
 from decoders.profiles import Profile, load_profile, parse_profile
 from gateway.errors import GatewayError
@@ -53,7 +54,9 @@ def _kept(name: object, info: ValidationInfo) -> object:
 
 def definitions_of(source: str | TomlFile) -> Definitions:
     """The label set that a channel names. Raises ValueError for an unknown name or a set that is refused."""
-    return load_definitions(source) if isinstance(source, str) else parse_definitions(source.text, source.path)
+    definitions = load_definitions(source) if isinstance(source, str) else parse_definitions(source.text, source.path)
+    control708.is_panel(definitions)  # which refuses one that cannot be compared
+    return definitions
 
 
 def profile_of(source: str | TomlFile) -> Profile:

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from decoders import arinc429
+from decoders import arinc429, control708
 from decoders import formats as f
 from decoders.arinc429 import JoinRule
 from decoders.definitions import Definitions, for_equipment, load_definitions
@@ -15,6 +15,7 @@ from decoders.health429 import EQUIPMENT, BusHealth
 from decoders.profiles import Profile
 from decoders.racklink import ChannelCount, Framer, Hello, Packet, words429
 from gateway.config import AdapterConfig, definitions_of, profile_of
+from monitor.utc import TIME, UTC_LABELS
 
 SEQUENCE_RANGE = 1 << 32
 FLAG_NAMES = {
@@ -34,6 +35,7 @@ class Channel429:
     definitions: Definitions
     health: BusHealth
     kind: int
+    is_panel: bool = False
     orientation: str = "wire"
     join_rule: JoinRule = "concatenate"
     delays_ns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(256, np.int64))  # by label
@@ -134,6 +136,8 @@ class Link:
         for row in definitions.labels.values():  # a remainder is as old as what it belongs to
             if row.fine_of is not None:
                 delays_ns[row.label] = delays_ns[row.fine_of]
+        if TIME in definitions.labels and definitions.labels[TIME].encoding == "time":
+            delays_ns[[*UTC_LABELS]] = delays_ns[TIME]
         before = self.channels.get(number)
         if isinstance(before, Channel429) and before.reads(definitions, orientation, kind):
             return  # a bridge says the same again every few seconds, and the health of the bus goes on
@@ -141,6 +145,7 @@ class Link:
             definitions,
             BusHealth(definitions, orientation, kind),
             kind,
+            control708.is_panel(definitions),
             orientation,
             configured.join_rule if configured else "concatenate",
             delays_ns,

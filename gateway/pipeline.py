@@ -203,7 +203,7 @@ class Pipeline:
         yield from self._hear(f"{record.adapter}/{packet.channel}", record)
         for finding in channel.health.feed(block.time_ns, values):
             yield self._finding(f"{record.adapter}/{packet.channel}", finding, record)
-        if channel.definitions.equipment_id == control708.PANEL:
+        if channel.is_panel:
             self._command(channel, block.time_ns + offset_ns, block.words, values)
         true_ns = block.time_ns + offset_ns - channel.delays_ns[values.label]
         self._aircraft.feed(channel.definitions, true_ns, block.words, values, channel.join_rule)
@@ -319,6 +319,6 @@ class Pipeline:
             newest = track.newest
             age_s[name] = (now_ns - newest[0]) / 1e9 if newest else None
         utc = self._aircraft.utc.at(now_ns)
-        values["utc_s"] = utc and utc.utc_ns / 1e9
-        validity["utc_s"] = "MISSING" if utc is None else "NORMAL" if utc.precise else "NOT_PRECISE"
+        values["utc_s"] = None if utc.utc_ns is None else utc.utc_ns / 1e9
+        validity["utc_s"] = utc.validity
         return StateEvent(record.stamp.utc_ns, record.sequence, values, validity, age_s)

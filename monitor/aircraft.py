@@ -5,6 +5,7 @@ for it silently: an inertial position steps by 19 m and drifts, so it is kept be
 quantity are never mixed either: the first is used until it falls silent.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
@@ -22,7 +23,7 @@ from monitor.settings import HeightSource
 from monitor.track import MISSING, NORMAL, STALE, Quantity, Track
 from monitor.utc import UTC_LABELS, UtcClock
 
-EPOCH_NS = 40_000_000  # a set is sent in one burst, at low speed in 35 ms; the next comes 100 ms later or more
+EPOCH_NS = 40_000_000  # a set is sent in one burst, at low speed in 35 ms
 G_M_S2: Final = 9.80665
 SI: Final = {
     "": 1.0, "deg": 1.0, "deg/s": 1.0, "m": 1.0, "ft": FT_M, "NM": NM_M, "kt": KT_M_S, "ft/min": FT_M / 60, "g": G_M_S2,
@@ -143,6 +144,13 @@ class _Half:
     coarse: bool
 
 
+def _epoch_ns(definitions: Definitions, axis: Axis) -> int:
+    """How far apart the words of one epoch may be: less than half the time to the next epoch."""
+    definition = definitions.labels.get(axis.coarse)
+    shortest_ms = definition.interval_ms[0] if definition and definition.interval_ms else math.inf
+    return min(EPOCH_NS, round(min(shortest_ms, 1000.0) * 1e6 / 2))
+
+
 def status_name(status: int) -> str:
     """The name of a status as it stands in reasons: a bus status, STALE or MISSING."""
     return {STALE: "STALE", MISSING: "MISSING"}.get(status) or Status(status).name
@@ -181,7 +189,7 @@ class Aircraft:
         for k, label in enumerate(labels):
             if axis := AXIS_OF.get((equipment, label)):
                 half = _Half(int(time_ns[k]), int(words[k]), int(values.status[k]), label == axis.coarse)
-                self._join(axis, equipment, half, join_rule)
+                self._join(axis, equipment, half, join_rule, _epoch_ns(definitions, axis))
             elif label in UTC_LABELS and equipment in GNSS:
                 self.utc.feed(int(time_ns[k]), int(words[k]), values, k, definitions)
 
@@ -224,7 +232,7 @@ class Aircraft:
         if newest[0] is None or newest[1] is None:
             return 0.0, int(Status.NO_COMPUTED_DATA)
         (_, latitude, one), (_, longitude, other) = newest[0], newest[1]
-        return geoid.undulation_m(latitude, longitude), max(one, other)
+        return geoid.undulation_m(latitude, longitude) if max(one, other) == NORMAL else 0.0, max(one, other)
 
     def _append(
         self,
@@ -243,9 +251,9 @@ class Aircraft:
         self._owners[quantity.name] = equipment
         track.append(time_ns, value, status)
 
-    def _join(self, axis: Axis, equipment: int, half: _Half, rule: JoinRule) -> None:
+    def _join(self, axis: Axis, equipment: int, half: _Half, rule: JoinRule, epoch_ns: int) -> None:
         other = self._halves.pop(axis.quantity.name, None)
-        if other is None or other.coarse == half.coarse or abs(half.time_ns - other.time_ns) > EPOCH_NS:
+        if other is None or other.coarse == half.coarse or abs(half.time_ns - other.time_ns) > epoch_ns:
             self._halves[axis.quantity.name] = half
             return
         coarse, fine = (half, other) if half.coarse else (other, half)
@@ -254,5 +262,7 @@ class Aircraft:
         if status == NORMAL:
             words = np.array([coarse.word], np.uint32), np.array([fine.word], np.uint32)
             degrees = arinc429.join_position(*words, rule)
+            if axis.quantity.name.endswith("latitude_deg") and abs(degrees[0]) > 90:
+                status = int(Status.INVALID_DATA)
             self._joins[axis.quantity.name].feed(*words, rule)
         self._append(axis.quantity, equipment, np.array([coarse.time_ns]), degrees, np.array([status], np.uint8))

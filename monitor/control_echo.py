@@ -35,13 +35,14 @@ class ControlEcho:
         self.command = Command()  # the latest
         self._changed_ns = 0
         self._heard_ns: int | None = None
-        self._told: list[str] = []  # states told since the command changed
+        self._told = False  # whether a mismatch was told since the command changed
+        self._open = False  # whether one was told that has not been told to be over
 
     def feed_command(self, time_ns: int, command: Command) -> None:
         """Take what the panel asks for now."""
         self._heard_ns = time_ns
         if any(_differ(new, old) for new, old in zip(command, self.command, strict=True)):
-            self.command, self._changed_ns, self._told = command, time_ns, []
+            self.command, self._changed_ns, self._told = command, time_ns, False
 
     def feed_radial(self, time_ns: int, radials: Radials, k: int = 0) -> Finding | None:
         """Compare radial k; what is to be told of it, if anything."""
@@ -56,13 +57,13 @@ class ControlEcho:
             if value is not None and _differ(value, echo[name])
         ]
         self.unlike += bool(unlike)
-        return self._tell("ECHO_MISMATCH" if unlike else "ECHO_AGREES", unlike)
-
-    def _tell(self, state: str, unlike: list[str]) -> Finding | None:
-        if state in self._told or not (unlike or self._told):
-            return None
-        self._told.append(state)
-        return Finding(state, "; ".join(unlike) or "the radar does what its panel asks")
+        if unlike and not self._told:
+            self._told = self._open = True
+            return Finding("ECHO_MISMATCH", "; ".join(unlike))
+        if not unlike and self._open:
+            self._open = False
+            return Finding("ECHO_AGREES", "the radar does what its panel asks")
+        return None
 
 
 def _asked(command: Command) -> dict[str, float | None]:

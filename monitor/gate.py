@@ -16,6 +16,7 @@ MODES: Final = (
     "self test", "initialisation", "acquisition", "navigation", "altitude aiding", "reserved", "aided", "fault",
 )  # fmt: skip
 USABLE_MODES: Final = (3, 4, 6)
+VOUCHING: Final = (GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE)
 
 
 def position_doubts(
@@ -25,13 +26,11 @@ def position_doubts(
 
     The end of scale of label 130, 16 NM, stands for a receiver that has no limit to give.
     """
-    mode, limit, failure = (
-        aircraft.tracks[quantity.name].at(time_ns) for quantity in (GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE)
-    )
+    mode, limit, failure = (aircraft.tracks[quantity.name].at(time_ns) for quantity in VOUCHING)
     kind = mode.value.astype(np.intp) >> 2
-    known = (mode.status == 0) & (limit.status == 0)
+    known = (mode.status == 0) & (limit.status == 0) & (failure.status == 0)
     doubts: dict[str, NDArray[np.bool_]] = {}
-    for name, values in ((GNSS_MODE.name, mode), (INTEGRITY_LIMIT.name, limit)):
+    for name, values in zip((q.name for q in VOUCHING), (mode, limit, failure), strict=True):
         for status in np.unique(values.status[values.status > 0]).tolist():
             doubts[f"{name}: {status_name(status)}"] = values.status == status
     for code in np.unique(kind[known]).tolist():
@@ -41,5 +40,6 @@ def position_doubts(
     largest = limit.value[loose].max(initial=0.0) / NM_M
     doubts[f"the GNSS receiver's horizontal integrity limit is {largest:.2f} NM, above {largest_limit_nm:g}"] = loose
     doubts["the GNSS receiver has detected a satellite failure"] = known & (failure.value > 0)
+    doubts["the GNSS receiver's horizontal integrity limit is 0, as no limit can be"] = known & (limit.value <= 0)
     reasons = [f"{why} on {np.count_nonzero(at)} of {len(time_ns)} radials" for why, at in doubts.items() if at.any()]
     return np.logical_or.reduce(list(doubts.values())), reasons

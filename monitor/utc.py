@@ -1,8 +1,8 @@
 """UTC of the GNSS receiver: date (260), time of day (150), its fraction (140) and the fraction's fraction (141).
 
 The words of one set belong together, but their order on the bus is free and around midnight the time may roll over
-before the date: the day is chosen that lies nearest to where the last set said we are. In a leap second 150 counts to
-23:59:60, which is the same count of seconds as the midnight after it.
+before the date: within seconds of midnight the day is chosen that follows from the last set. In a leap second 150
+counts to 23:59:60, which is the same count of seconds as the midnight after it.
 """
 
 from dataclasses import dataclass, field
@@ -15,16 +15,19 @@ from decoders.definitions import Definitions
 DATE, TIME, FRACTION, FINE_FRACTION = 0o260, 0o150, 0o140, 0o141
 UTC_LABELS: Final = frozenset({DATE, TIME, FRACTION, FINE_FRACTION})
 SET_NS: Final = 40_000_000  # a set is sent in one burst
-DATE_NS: Final = 2_500_000_000  # how long a date holds without another
-DAY_NS: Final = 86_400_000_000_000
+HOLDS_NS: Final = 2_500_000_000  # how long a date, or a whole set, holds without another
+MIDNIGHT_S: Final = 10  # how far around midnight date and time may not belong together
+NEAR_NS: Final = 5_000_000_000
+DAY_S: Final = 86_400
+DAY_NS: Final = DAY_S * 1_000_000_000
 EPOCH_2000_NS: Final = 946_684_800_000_000_000  # 2000-01-01 after 1970-01-01
 
 
 class Utc(NamedTuple):
-    """UTC, ns since 1970 without leap seconds, and whether the receiver calls it precise."""
+    """UTC, ns since 1970 without leap seconds, or None; what it is worth: NORMAL, NOT_PRECISE, STALE or MISSING."""
 
-    utc_ns: int
-    precise: bool
+    utc_ns: int | None
+    validity: str
 
 
 @dataclass
@@ -49,13 +52,17 @@ class UtcClock:
         if label != DATE:
             self._complete(time_ns)
 
-    def at(self, time_ns: int) -> Utc | None:
-        """UTC at a time of the words' clock, or None while no set has come."""
-        return None if self._offset_ns is None else Utc(time_ns + self._offset_ns, self._precise)
+    def at(self, time_ns: int) -> Utc:
+        """UTC at a time of the words' clock."""
+        if self._offset_ns is None:
+            return Utc(None, "MISSING")
+        if time_ns - self._set_ns > HOLDS_NS:
+            return Utc(None, "STALE")
+        return Utc(time_ns + self._offset_ns, "NORMAL" if self._precise else "NOT_PRECISE")
 
     def _complete(self, now_ns: int) -> None:
         parts = self._parts
-        if TIME not in parts or DATE not in parts or now_ns - parts[DATE][0] > DATE_NS:
+        if TIME not in parts or DATE not in parts or now_ns - parts[DATE][0] > HOLDS_NS:
             return
         sent_ns, seconds = parts[TIME]
         if now_ns - sent_ns > SET_NS:  # a fraction of the next set, whose time is still to come
@@ -66,7 +73,8 @@ class UtcClock:
         utc_ns = (
             EPOCH_2000_NS + round(parts[DATE][1]) * DAY_NS + round(seconds) * 1_000_000_000 + round(sum(near) * 1e9)
         )
-        if self._offset_ns is not None and sent_ns >= self._set_ns:
+        if self._offset_ns is not None and sent_ns >= self._set_ns and (seconds + MIDNIGHT_S) % DAY_S <= 2 * MIDNIGHT_S:
             expected_ns = sent_ns + self._offset_ns
-            utc_ns = min((utc_ns + days * DAY_NS for days in (0, -1, 1)), key=lambda ns: abs(ns - expected_ns))
+            near_days = [ns for ns in (utc_ns - DAY_NS, utc_ns + DAY_NS) if abs(ns - expected_ns) <= NEAR_NS]
+            utc_ns = near_days[0] if near_days else utc_ns
         self._offset_ns, self._set_ns = utc_ns - sent_ns, sent_ns

@@ -1,13 +1,14 @@
 """Control words of the radar's panel, their bits laid out here as the public manual lists them."""
 
 import math
+from pathlib import Path
 
 import pytest
 
 from decoders.arinc429 import Status
 from decoders.arinc429 import decode as decode429
-from decoders.control708 import Command, decode
-from decoders.definitions import load_definitions
+from decoders.control708 import Command, decode, is_panel
+from decoders.definitions import DefinitionError, load_definitions
 from tests.decoders.bus import word429
 
 PANEL = load_definitions("wxr_panel")
@@ -78,3 +79,15 @@ def test_the_words_pass_the_label_set_as_normal_discretes() -> None:
     words = [word1(), word2(1), word429(0o273, {})]
     assert decode429(words, PANEL).status.tolist() == [Status.NORMAL] * 3
     assert DIVIDED.labels.keys() == PANEL.labels.keys() == {0o270, 0o271, 0o273}
+
+
+def test_a_panel_is_known_by_its_fields_and_one_of_other_widths_is_refused(tmp_path: Path) -> None:
+    assert is_panel(load_definitions("wxr_panel"))
+    assert is_panel(load_definitions("wxr_panel_divided_range"))
+    assert not is_panel(load_definitions("iru_704"))
+    (tmp_path / "mine.toml").write_text(
+        "[mine]\nequipment_id = 0x02F\nextends = 'wxr_panel'\nrows = [{ label = '270', name = 'n', encoding = 'disc', "
+        "fields = { mode = [14, 16], tilt = [17, 22], gain = [23, 29] }, source = 's', confidence = 'c' }]"
+    )
+    with pytest.raises(DefinitionError, match=r"\[mine\] label 270: (tilt has 6|gain has 7) bits"):
+        is_panel(load_definitions(tmp_path / "mine.toml"))

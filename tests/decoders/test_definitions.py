@@ -42,7 +42,12 @@ def test_a_file_of_the_users_is_a_set(tmp_path: Path) -> None:
         ("label = '314', encoding = 'bnr2'", "unknown encoding 'bnr2'"),
         ("label = '314', encoding = 'time', bits = [12, 28]", "bits"),
         (f"label = '314', {ANGLE}, ssm = 'odd'", "unknown ssm 'odd'"),
-        (f"label = '314', {ANGLE}, fields = 7", "has no attribute"),
+        (f"label = '314', {ANGLE}, fields = 7", "fields is 7, which is no table"),
+        (f"label = '314', {ANGLE}, fields = {{ a = [11, 12, 13] }}", "give a bit, or the first and the last"),
+        (f"label = '314', {ANGLE}, interval_ms = true", "interval_ms is True"),
+        (f"label = '314', {ANGLE}, positive = 5", "positive is 5, which is no text"),
+        (f"label = '314', {ANGLE.replace('[14, 28]', '[14.0, 28.0]')}", "give a bit, or the first and the last"),
+        ("label = '314', encoding = ['bnr']", "encoding is .'bnr'., which is no text"),
         (f"label = '400', {ANGLE}", "octal, '000' to '377'"),
         (f"label = '389', {ANGLE}", "'389' is no label"),
         (f"label = 314, {ANGLE}", "label 314"),
@@ -65,6 +70,45 @@ def test_a_label_twice_in_one_set_is_refused(tmp_path: Path) -> None:
         load_definitions(file_of(tmp_path, f"label = '14', {ANGLE}", f"label = '014', {ANGLE}"))
 
 
+ROW = f"{{ {BASE}, label = '310', encoding = 'disc' }}"
+BAD = f"{{ {BASE}, label = '314', encoding = 'bad' }}"
+
+
+@pytest.mark.parametrize(
+    ("rows", "line"),
+    [
+        (f"rows = [\n{BAD}]", 4),
+        (f"rows = [\n  {ROW},\n  {BAD},\n]", 5),
+        (f"rows = [\n# {BAD}\n{ROW}, # label = '314' {{\n{BAD}]", 6),
+        (f"rows = [{ROW.replace(chr(39) + 'n' + chr(39), chr(39) + 'label = 314 [{' + chr(39))},\n{BAD}]", 4),
+        (f"rows = [\n{{ {BASE}, encoding = 'disc' }}]", 4),
+        ("[[mine.rows]]\nname = 'n'\n[[mine.rows]]\nlabel = '314'", 3),
+    ],
+)
+def test_the_line_is_that_of_the_row(rows: str, line: int, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(f"[mine]\nequipment_id = 1\n{rows}")
+    with pytest.raises(DefinitionError, match=rf"mine.toml:{line} \[mine\] label"):
+        load_definitions(tmp_path / "mine.toml")
+
+
+def test_a_set_that_extends_what_there_is_not_names_the_file(tmp_path: Path) -> None:
+    with pytest.raises(DefinitionError, match=r"mine.toml \[mine\] extends: no definitions 'nothing'"):
+        load_definitions(file_of(tmp_path, f"label = '314', {ANGLE}", head="equipment_id = 1\nextends = 'nothing'"))
+
+
+@pytest.mark.parametrize(
+    ("row", "why"),
+    [
+        ("bits = [11, 28], range = 180, lsb = '180/2^18'", "a position is joined from bits 9 to 28"),
+        ("bits = [9, 28], range = 90, lsb = '90/2^20'", "a position is joined from bits 9 to 28"),
+    ],
+)
+def test_a_position_word_that_would_not_be_read_as_it_is_defined_is_refused(row: str, why: str, tmp_path: Path) -> None:
+    text = f"label = '110', encoding = 'bnr', units = 'deg', {row}"
+    with pytest.raises(DefinitionError, match=why):
+        load_definitions(file_of(tmp_path, text, head="equipment_id = 0x00B\nextends = 'gnss_743a'"))
+
+
 def test_a_set_that_extends_another_replaces_labels_and_keeps_the_rest(tmp_path: Path) -> None:
     head = "equipment_id = 4\nextends = 'iru_704'"
     wide = ANGLE.replace("14, 28", "11, 28").replace("^15", "^18")
@@ -82,6 +126,8 @@ def test_a_set_that_extends_another_replaces_labels_and_keeps_the_rest(tmp_path:
         ("[a]\nrows = []", "a set has equipment_id"),
         ("[a]\nequipment_id = 1\nrows = []\nrowz = []", "a set has equipment_id"),
         ("[a]\nequipment_id = 1\nrows = [7]", "7 is no row"),
+        ("[a]\nequipment_id = 1\nrows = []", "at least one row"),
+        ("[a]\nequipment_id = 1\nrows = [{ lsb = inf }]", "is no TOML"),
         ("a = ", "is no TOML"),
         ("[a]\nequipment_id = '0x0B'\nrows = []", "equipment_id is a number"),
         ("[a]\nequipment_id = -5\nrows = []", "equipment_id is a number"),

@@ -106,3 +106,28 @@ def test_a_box_that_names_another_equipment_is_told() -> None:
 
 def test_a_clock_that_begins_anew_makes_no_findings() -> None:
     assert Bus().every(20, PITCH, 9000, 12000).every(20, PITCH, 0, 3000).found == []
+
+
+@pytest.mark.parametrize("interval_ms", [7.4, 7.5, 7.6, 8.9, 9.0, 9.1, 50.0, 54.0, 55.0, 60.0, 62.4, 62.6])
+def test_no_rate_however_close_to_a_limit_is_told_and_taken_back_in_turn(interval_ms: float) -> None:
+    jitter = np.random.default_rng(3).normal(0, 0.2, round(20_000 / interval_ms))
+    times = np.arange(len(jitter)) * interval_ms + jitter
+    assert len(Bus().send(*((float(time), PITCH) for time in times)).found) <= 1
+
+
+def test_a_label_that_comes_too_slowly_is_told_from_its_mean_interval() -> None:
+    bus = Bus().send(*mixed((20, PITCH), (400, LATITUDE), stop_ms=10_000))
+    assert bus.told == [("slowness of 310", True)]
+    assert bus.found[0].reason == "label 310 comes every 400.0 ms, 200 is the longest interval"
+
+
+def test_one_stray_word_is_no_label_that_stopped() -> None:
+    assert Bus().send(*mixed((20, PITCH), stop_ms=10_000), (500, LATITUDE)).found == []
+
+
+@pytest.mark.parametrize("share", [0.1, 0.15, 0.2, 0.25])
+def test_a_share_of_bad_parity_is_not_told_and_taken_back_in_turn(share: float) -> None:
+    random = np.random.default_rng(4)
+    words = [word429(0o324, {}, ssm=3, odd=bool(random.random() >= share)) for _ in range(3000)]
+    told = Bus().send(*((20.0 * k, word) for k, word in enumerate(words))).told
+    assert sum(about == "parity" for about, _ in told) <= 3

@@ -449,7 +449,8 @@ def test_a_radar_that_does_not_do_what_its_panel_asks_is_told_once_and_counted()
     pipeline = Pipeline(panel_rack(), None)
     told = echoes(pipeline, [-2.0, 3.0, -2.0])
     assert [(event.adapter, event.state, event.reason) for event in told] == [
-        ("bridge", "ECHO_MISMATCH", "tilt_deg: panel 3, radar -2")
+        ("bridge", "ECHO_MISMATCH", "tilt_deg: panel 3, radar -2"),
+        ("bridge", "ECHO_AGREES", "the radar does what its panel asks"),
     ]
     found = counters(pipeline)
     assert found["bridge.echo_mismatch"] == 1

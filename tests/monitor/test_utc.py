@@ -56,8 +56,8 @@ def test_a_set_in_any_order_gives_its_instant_to_the_nanosecond(order: tuple[int
     feed(clock, 5000, [date(moment)])
     feed(clock, 5001, [words[k] for k in order])
     at = clock.at((5001 + order.index(1)) * MS)  # when the time of day was sent
-    assert at is not None
-    assert at.precise
+    assert at.validity == "NORMAL"
+    assert at.utc_ns is not None
     assert abs(at.utc_ns - utc_ns(moment)) <= 1
 
 
@@ -65,14 +65,14 @@ def test_three_quarters_of_a_second_are_added_and_never_taken_away() -> None:
     clock, moment = UtcClock(), datetime(2026, 6, 1, 0, 0, 1, 750_000, UTC)
     feed(clock, 0, whole(moment))
     at = clock.at(1 * MS)
-    assert at is not None
+    assert at.utc_ns is not None
     assert at.utc_ns % 10**9 == pytest.approx(750_000_000, abs=1)
 
 
 def test_without_fractions_the_time_of_day_is_enough() -> None:
     clock, moment = UtcClock(), datetime(2026, 6, 1, 7, 8, 9, tzinfo=UTC)
     feed(clock, 0, whole(moment)[:2])
-    assert clock.at(1 * MS) == (utc_ns(moment), True)
+    assert clock.at(1 * MS) == (utc_ns(moment), "NORMAL")
 
 
 @pytest.mark.parametrize("rolls_late", [0, 1, 2])
@@ -86,7 +86,6 @@ def test_midnight_takes_no_day_and_gives_none_whichever_word_rolls_over_first(ro
             dated = moment + timedelta(seconds=rolls_late if ahead else -rolls_late)
             feed(clock, 1000 * second, [date(dated), *whole(moment)[1:]])
             at = clock.at((1000 * second + 1) * MS)
-            assert at is not None
             assert at.utc_ns == utc_ns(moment)
 
 
@@ -99,7 +98,7 @@ def test_a_leap_second_is_the_second_before_midnight_counted_twice() -> None:
     ):
         feed(clock, 1000 * second, words)
         at = clock.at((1000 * second + 1) * MS)
-        assert at is not None
+        assert at.utc_ns is not None
         seen.append(at.utc_ns - midnight)
     assert seen == [-(10**9), 0, 0]
 
@@ -107,13 +106,13 @@ def test_a_leap_second_is_the_second_before_midnight_counted_twice() -> None:
 def test_the_years_are_those_of_this_century() -> None:
     clock, moment = UtcClock(), datetime(2099, 2, 28, 1, 2, 3, tzinfo=UTC)
     feed(clock, 0, whole(moment))
-    assert clock.at(1 * MS) == (utc_ns(moment), True)
+    assert clock.at(1 * MS) == (utc_ns(moment), "NORMAL")
 
 
 def test_a_receiver_that_is_not_precise_yet_says_so() -> None:
     clock, moment = UtcClock(), datetime(2026, 6, 1, tzinfo=UTC)
     feed(clock, 0, [date(moment), time(0, 0, 0, precise=False)])
-    assert clock.at(1 * MS) == (utc_ns(moment), False)
+    assert clock.at(1 * MS) == (utc_ns(moment), "NOT_PRECISE")
 
 
 @pytest.mark.parametrize("late", [0, 1])
@@ -124,11 +123,34 @@ def test_words_of_two_sets_are_never_mixed(late: int) -> None:
     second = whole(first + timedelta(seconds=1, milliseconds=500))
     feed(clock, 1500, [second[0], *second[2:]][late:])
     at = clock.at(1501 * MS)
-    assert at is not None
     assert at.utc_ns == utc_ns(first) + 1500 * MS
 
 
 def test_nothing_is_known_before_a_set_and_nothing_new_from_words_that_are_not_normal() -> None:
     clock, moment = UtcClock(), datetime(2026, 6, 1, 12, 0, 0, tzinfo=UTC)
     feed(clock, 0, [date(moment), time(12, 0, 0, ssm=1)])
-    assert clock.at(0) is None
+    assert clock.at(0) == (None, "MISSING")
+
+
+@pytest.mark.parametrize(("silent_ms", "validity"), [(2400, "NORMAL"), (2600, "STALE"), (60_000, "STALE")])
+def test_utc_runs_on_for_two_seconds_and_a_half_and_is_stale_then(silent_ms: int, validity: str) -> None:
+    clock, moment = UtcClock(), datetime(2026, 6, 1, 12, 0, 0, tzinfo=UTC)
+    feed(clock, 0, whole(moment))
+    feed(clock, silent_ms - 10, [time(12, 0, 0, ssm=1)])
+    assert clock.at(silent_ms * MS).validity == validity
+
+
+@pytest.mark.parametrize("wrong", [datetime(2000, 1, 1, tzinfo=UTC), datetime(2026, 6, 2, tzinfo=UTC)])
+def test_a_date_that_is_corrected_is_followed_at_once(wrong: datetime) -> None:
+    clock, moment = UtcClock(), datetime(2026, 6, 1, 12, 0, 0, tzinfo=UTC)
+    feed(clock, 0, [date(wrong), time(12, 0, 0)])
+    feed(clock, 1000, whole(moment + timedelta(seconds=1)))
+    assert clock.at(1001 * MS).utc_ns == utc_ns(moment + timedelta(seconds=1))
+
+
+def test_a_start_at_midnight_with_a_late_date_is_right_ten_seconds_later() -> None:
+    clock, midnight = UtcClock(), datetime(2027, 1, 1, tzinfo=UTC)
+    feed(clock, 0, [date(midnight - timedelta(days=1)), time(0, 0, 0)])
+    for second in range(1, 13):
+        feed(clock, 1000 * second, whole(midnight + timedelta(seconds=second)))
+    assert clock.at(12_001 * MS).utc_ns == utc_ns(midnight + timedelta(seconds=12))
