@@ -56,6 +56,8 @@ class BusHealth:
         self._definitions = definitions
         self._orientation = orientation
         self._speed = "low" if kind == KIND_429_LOW else "high"
+        self.has_sdi = np.isin(np.arange(256), [label for label, row in definitions.labels.items() if row.has_sdi])
+        self._sources: set[tuple[int, int]] = set()  # label and SDI of the words of this second
         self._is_known = np.isin(np.arange(256), list(definitions.labels))
         self._rates: dict[int, _Rate] = {}
         self._wrong: set[str] = set()
@@ -63,7 +65,9 @@ class BusHealth:
         self._words = 0
         self._known = Counter[str]()  # words since reading was last judged, by what they say of it
 
-    def feed(self, time_ns: npt.NDArray[np.int64], values: Values429) -> Iterator[Finding]:
+    def feed(
+        self, time_ns: npt.NDArray[np.int64], words: npt.NDArray[np.uint32], values: Values429
+    ) -> Iterator[Finding]:
         """Take one decoded block (n,) with the device times of its words; give what has changed."""
         now_ns = int(time_ns[-1])
         if self._second_ns is None or now_ns < self._second_ns:  # the first word, or a clock that began anew
@@ -73,6 +77,9 @@ class BusHealth:
         good = values.status != Status.BAD_PARITY
         labels = values.label[good]
         self._words += len(values.label)
+        sourced = good & self.has_sdi[values.label]
+        sdi = words[sourced] >> np.uint32(8) & np.uint32(3)
+        self._sources |= set(zip(values.label[sourced].tolist(), sdi.tolist(), strict=True))
         self._known["bad parity"] += len(values.label) - len(labels)
         self._known["good"] += len(labels)
         self._known["known"] += int(self._is_known[labels].sum())
@@ -98,6 +105,11 @@ class BusHealth:
             yield from self._rate(label, rate, now_ns)
         if self._known["good"] + self._known["bad parity"] >= ENOUGH_WORDS:
             yield from self._reading()
+        several = Counter(label for label, sdi in self._sources if sdi)
+        shared = ", ".join(f"{label:03o}" for label, count in sorted(several.items()) if count > 1)
+        reason = f"labels {shared} come from several sources (SDI): say with sdi which one the channel is to use"
+        yield from self._tell("sources", bool(shared), reason)
+        self._sources.clear()
         self._second_ns, self._words = now_ns, 0
 
     def _rate(self, label: int, rate: _Rate, now_ns: int) -> Iterator[Finding]:

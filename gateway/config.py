@@ -98,6 +98,9 @@ class ChannelConfig(_Section):
     join_rule: Literal["concatenate", "toward_zero"] = Field(
         "concatenate", description="how fine position words join coarse ones in the south and west"
     )
+    sdi: int | None = Field(
+        None, ge=1, le=3, description="the source to use where a bus carries several; words to all, SDI 0, count too"
+    )
     delays_ms: dict[OctalLabel, Delay] = Field(
         default_factory=dict, description="by octal label, how long after it was true a value is sent"
     )

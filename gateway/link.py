@@ -38,6 +38,7 @@ class Channel429:
     is_panel: bool = False
     orientation: str = "wire"
     join_rule: JoinRule = "concatenate"
+    sdi: int | None = None
     delays_ns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(256, np.int64))  # by label
 
     packet_type: ClassVar[int] = f.WORDS_429
@@ -45,6 +46,13 @@ class Channel429:
     def reads(self, definitions: Definitions, orientation: str, kind: int) -> bool:
         """Whether it is read in this way already."""
         return (self.definitions, self.orientation, self.kind) == (definitions, orientation, kind)
+
+    def uses(self, words: NDArray[np.uint32], labels: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """Which words (n,) come from the source that is to be used, as bits 9 and 10 say where they are no data."""
+        sdi = words >> np.uint32(8) & np.uint32(3)
+        if self.sdi is None:
+            return np.ones(len(words), np.bool_)
+        return np.asarray((sdi == 0) | (sdi == self.sdi) | ~self.health.has_sdi[labels])
 
     @property
     def role(self) -> str:
@@ -148,6 +156,7 @@ class Link:
             control708.is_panel(definitions),
             orientation,
             configured.join_rule if configured else "concatenate",
+            configured.sdi if configured else None,
             delays_ns,
         )
 

@@ -201,12 +201,15 @@ class Pipeline:
                 link.counters[f"words_429_{arinc429.Status(status).name.lower()}"] += count
         offset_ns = yield from self._offset_ns(packet, record)
         yield from self._hear(f"{record.adapter}/{packet.channel}", record)
-        for finding in channel.health.feed(block.time_ns, values):
+        for finding in channel.health.feed(block.time_ns, block.words, values):
             yield self._finding(f"{record.adapter}/{packet.channel}", finding, record)
         if channel.is_panel:
             self._command(channel, block.time_ns + offset_ns, block.words, values)
         true_ns = block.time_ns + offset_ns - channel.delays_ns[values.label]
-        self._aircraft.feed(channel.definitions, true_ns, block.words, values, channel.join_rule)
+        used = channel.uses(block.words, values.label)
+        if used.any():
+            some = arinc429.Values429(values.label[used], values.value[used], values.status[used])
+            self._aircraft.feed(channel.definitions, true_ns[used], block.words[used], some, channel.join_rule)
 
     def _finding(self, about: str, finding: Finding, record: Raw) -> StatusEvent:
         state = "BUS_WRONG" if finding.wrong else "BUS_RIGHT"

@@ -27,8 +27,8 @@ class Bus:
         for start in range(0, len(ordered), 8):
             block = ordered[start : start + 8]
             times = np.array([round(time * MS) for time, _ in block], np.int64)
-            values = decode(np.array([word for _, word in block], np.uint32), IRU, self._orientation)
-            self.found += self.health.feed(times, values)
+            words = np.array([word for _, word in block], np.uint32)
+            self.found += self.health.feed(times, words, decode(words, IRU, self._orientation))
         return self
 
     def every(self, interval_ms: float, word: int, start_ms: float = 0, stop_ms: float = 5000) -> "Bus":
@@ -131,3 +131,13 @@ def test_a_share_of_bad_parity_is_not_told_and_taken_back_in_turn(share: float) 
     words = [word429(0o324, {}, ssm=3, odd=bool(random.random() >= share)) for _ in range(3000)]
     told = Bus().send(*((20.0 * k, word) for k, word in enumerate(words))).told
     assert sum(about == "parity" for about, _ in told) <= 3
+
+
+def test_a_label_that_comes_from_two_sources_is_told_and_one_to_all_is_not() -> None:
+    one, other, to_all = (word429(0o324, {9: (sdi, 2)}, ssm=3) for sdi in (1, 2, 0))
+    assert Bus().send(*mixed((40, one), (40, to_all))).found == []
+    found = Bus().send(*mixed((40, one), (41, other))).found
+    assert [finding.about for finding in found] == ["sources"]
+    assert found[0].reason.startswith("labels 324 come from several sources (SDI): say with sdi")
+    twenty_bits = [word429(0o310, {9: (low, 2)}, ssm=3) for low in (1, 2)]
+    assert Bus().send(*mixed((300, twenty_bits[0]), (310, twenty_bits[1]))).found == []

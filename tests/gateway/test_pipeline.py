@@ -510,3 +510,13 @@ def test_units_that_the_state_cannot_convert_are_told_and_break_nothing(tmp_path
 def test_no_adapter_can_be_named_like_a_part_of_the_gateway(name: str) -> None:
     with pytest.raises(GatewayError, match="choose another name"):
         check_config({"adapters": [{"name": name, "source": "serial:x"}]}, "test")
+
+
+def test_of_several_sources_on_one_bus_the_configured_one_is_used() -> None:
+    channels = {IRU: {"kind": "arinc429", "definitions": "iru_704", "sdi": 2}}
+    rack = check_config({"adapters": [{"name": "bridge", "source": "serial:x", "channels": channels}]}, "test")
+    bridge, pipeline = Bridge(), Pipeline(rack, None)
+    pitch = [word429(0o324, {9: (sdi, 2), 15: (1000 * sdi, 15)}, ssm=3) for sdi in (1, 2, 3)]
+    packets = [bridge.words(IRU, k / 50, pitch) for k in range(5)]
+    (state,) = only(StateEvent, feed(pipeline, raw(1, 0.08, b"".join(packets)), tick(2, 0.08)))
+    assert state.values["pitch_deg"] == 2000 * 180 / 2**14
