@@ -1,7 +1,6 @@
 """Speed as ratios: each group holds the work and a rival that does the least any program could; read the (x.x)."""
 
 import struct
-import time
 import zlib
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
+from benchmarks.limit import spin
 from decoders import arinc708
 from decoders.racklink import Framer
 from monitor.geodesy import NM_M
@@ -68,13 +68,6 @@ def test_framing_by_a_bare_loop_on_a_serial_line(benchmark: BenchmarkFixture, st
 
 def radar_words(count: int) -> NDArray[np.uint8]:
     return RNG.integers(0, 256, (count, 200), np.uint8)
-
-
-def spin(seconds: float) -> None:
-    """The rival where a limit is named: it lasts as long as the work may."""
-    end = time.perf_counter() + seconds
-    while time.perf_counter() < end:
-        pass
 
 
 @pytest.mark.benchmark(group="708 words to radials, 10000 words")

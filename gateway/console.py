@@ -1,12 +1,9 @@
 """What a person at a terminal reads: one line an event."""
 
 import sys
-from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 
 from gateway.events import Event, IntegrityEvent, ScanEvent, StatusEvent, SummaryEvent
-
-WIDEST = 300  # characters of a table
 
 
 def print_json(event: Event) -> None:
@@ -46,15 +43,3 @@ def describe(event: Event) -> str:
 def clock(time_ns: int) -> str:
     """UTC to the millisecond."""
     return datetime.fromtimestamp(time_ns / 1e9, UTC).strftime("%H:%M:%S.%f")[:-3]
-
-
-def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """A Markdown table on stdout for a report: as wide as it must be, whatever the terminal."""
-    from rich.box import MARKDOWN  # noqa: PLC0415 # the other verbs need none of it
-    from rich.console import Console  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
-
-    table = Table(*columns, box=MARKDOWN)
-    for row in rows:
-        table.add_row(*row)
-    Console(width=WIDEST).print(table)

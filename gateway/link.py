@@ -35,11 +35,11 @@ class Channel429:
     definitions: Definitions
     health: BusHealth
     kind: int
-    is_panel: bool = False
-    orientation: str = "wire"
-    join_rule: JoinRule = "concatenate"
-    sdi: int | None = None
-    delays_ns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(256, np.int64))  # by label
+    is_panel: bool
+    orientation: str
+    join_rule: JoinRule
+    sdi: int | None
+    delays_ns: NDArray[np.int64]  # (256,), by label
 
     packet_type: ClassVar[int] = f.WORDS_429
 
@@ -137,6 +137,9 @@ class Link:
         return None
 
     def _take(self, number: int, definitions: Definitions, orientation: str, kind: int) -> None:
+        before = self.channels.get(number)
+        if isinstance(before, Channel429) and before.reads(definitions, orientation, kind):
+            return  # a bridge says the same again every few seconds, and the health of the bus goes on
         configured = self.config.channels.get(number)
         delays_ns = np.zeros(256, np.int64)
         for label, delay_ms in configured.delays_ms.items() if configured else ():
@@ -146,9 +149,6 @@ class Link:
                 delays_ns[row.label] = delays_ns[row.fine_of]
         if TIME in definitions.labels and definitions.labels[TIME].encoding == "time":
             delays_ns[[*UTC_LABELS]] = delays_ns[TIME]
-        before = self.channels.get(number)
-        if isinstance(before, Channel429) and before.reads(definitions, orientation, kind):
-            return  # a bridge says the same again every few seconds, and the health of the bus goes on
         self.channels[number] = Channel429(
             definitions,
             BusHealth(definitions, orientation, kind),

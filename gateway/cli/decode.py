@@ -11,8 +11,8 @@ def decode_429(
     orientation: Annotated[str, typer.Option(help="wire or label_swapped")] = "wire",
 ) -> None:
     """Explain ARINC 429 words."""
-    from gateway.console import print_table
     from gateway.explain import explain_429
+    from gateway.tables import print_table
 
     for word in words:
         print_table(("field", "bits", "code", "meaning"), explain_429(word, definitions, orientation))
@@ -23,7 +23,7 @@ def decode_708(
     profile: Annotated[str, typer.Option(help="arinc708, arinc708a, wxr2100_6bit, or a TOML file")] = "arinc708",
 ) -> None:
     """Explain an ARINC 708 radar word."""
-    from gateway.console import print_table
     from gateway.explain import explain_708
+    from gateway.tables import print_table
 
     print_table(("field", "bits", "code", "value", "unit", "note"), explain_708(word, profile))

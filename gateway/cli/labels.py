@@ -9,8 +9,8 @@ def labels(
     name: Annotated[str | None, typer.Option("--set", help="label set by name, or a TOML file of one")] = None,
 ) -> None:
     """List the label sets, or every label of one with its bits, range, LSB, interval and source."""
-    from gateway.console import print_table
     from gateway.explain import LABEL_HEADINGS, SET_HEADINGS, label_rows, set_rows
+    from gateway.tables import print_table
 
     if name:
         print_table(LABEL_HEADINGS, label_rows(name))
