@@ -37,7 +37,7 @@ FIRST_SPARE: Final = f.UNUSUAL_708.index(next(iter(f.SPARE_708)))
 RESERVED_LEVEL: Final = 1 << f.UNUSUAL_708.index("reserved_level")
 TILT_LSB_DEG: Final = f.TILT_LSB_DEG
 SCAN_ANGLE_LSB_DEG: Final = f.SCAN_ANGLE_LSB_DEG
-BINS_AT_ONCE: Final = 32
+BYTES_AT_ONCE: Final = 24  # of the wire: 64 bins of 3 bits or 32 of 6
 WORDS_AT_ONCE: Final = 1024  # headers that stay in the nearest cache while each field passes over them
 
 
@@ -69,11 +69,13 @@ def headers(words: Bytes, meanings: Meanings, header: Header) -> None:
 
 @njit(cache=True)
 def unpack_bins(words: Bytes, bits_per_bin: int, reserved_level: int, bins: Bytes, unusual: Bytes) -> None:
-    """Fill the bins of each word, a multiple of 32 of 3 or 6 bits, and flag the words that hold a reserved level."""
+    """Fill the bins of each word, 64 or more of 3 or 6 bits, and flag the words that hold a reserved level."""
     level = np.uint8(reserved_level)
+    at_once = BYTES_AT_ONCE * 8 // bits_per_bin
     for i in range(words.shape[0]):
-        found = np.uint32(0)
-        for first in range(0, bins.shape[1], BINS_AT_ONCE):
+        found = np.uint64(0)
+        for start in range(0, bins.shape[1], at_once):
+            first = min(start, bins.shape[1] - at_once)  # the last ones reach back
             byte = HEADER_BYTES + first * bits_per_bin // 8
             if bits_per_bin == 3:
                 found |= _spread(3, words[i], byte, bins[i], first, level)
@@ -144,27 +146,29 @@ def _spare(bits: Array, place: Place, flag: int, unusual: Array) -> None:
         unusual[i] |= (_field(bits[i], place) != 0) << flag
 
 
-def _spread_32(_context: Any, width: Any, word: Any, byte: Any, bins: Any, first: Any, level: Any) -> Any:
-    """32 bins of `width` bits, 3 or 6, from word[byte:] to bins[first:], one a byte; a bit for each that is `level`.
+def _spread_24(_context: Any, width: Any, word: Any, byte: Any, bins: Any, first: Any, level: Any) -> Any:
+    """Bins of `width` bits, 3 or 6, from 24 bytes at word[byte:] to bins[first:], one a byte; a bit for each `level`.
 
     Each pair of bins lies in two neighbouring bytes: shuffle those into a 16-bit lane, shift the pair to its foot, and
-    move its upper half to the upper byte. The compiler finds no shuffle in a loop, which
-    takes twice as long.
+    move its upper half to the upper byte. The compiler finds no shuffle in a loop, which takes twice as long.
     """
     bits = width.literal_value
+    count = BYTES_AT_ONCE * 8 // bits
+    before = HEADER_BYTES  # loaded too: with them it is one register, and they are there before the first bin
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         source, target = (context.make_array(signature.args[k])(context, builder, arguments[k]).data for k in (1, 3))
-        i32, packed, lanes = ir.IntType(32), ir.VectorType(ir.IntType(8), 4 * bits), ir.VectorType(ir.IntType(16), 16)
-        spread = ir.VectorType(ir.IntType(8), BINS_AT_ONCE)
-        indices = ir.VectorType(i32, BINS_AT_ONCE)
+        i8, i16, i32, i64 = (ir.IntType(size) for size in (8, 16, 32, 64))
+        packed, lanes = ir.VectorType(i8, before + BYTES_AT_ONCE), ir.VectorType(i16, count // 2)
+        spread, indices = ir.VectorType(i8, count), ir.VectorType(i32, count)
 
         def constant(*lane_values: int) -> Any:
-            return ir.Constant(lanes, lane_values * (16 // len(lane_values)))
+            return ir.Constant(lanes, lane_values * (count // 2 // len(lane_values)))
 
-        pairs = [divmod(2 * bits * pair, 8) for pair in range(16)]  # byte and bit where each begins
-        pick = [min(at + k, 4 * bits - 1) for at, _ in pairs for k in (0, 1)]
-        place = builder.bitcast(builder.gep(source, [arguments[2]]), packed.as_pointer())
+        pairs = [divmod(2 * bits * pair, 8) for pair in range(count // 2)]  # byte and bit where each begins
+        pick = [before + min(at + k, BYTES_AT_ONCE - 1) for at, _ in pairs for k in (0, 1)]
+        start = builder.sub(arguments[2], ir.Constant(arguments[2].type, before))
+        place = builder.bitcast(builder.gep(source, [start]), packed.as_pointer())
         loaded = builder.load(place, align=1)
         pair = builder.bitcast(builder.shuffle_vector(loaded, loaded, ir.Constant(indices, pick)), lanes)
         pair = builder.lshr(pair, constant(*(bit for _, bit in pairs)))
@@ -175,9 +179,10 @@ def _spread_32(_context: Any, width: Any, word: Any, byte: Any, bins: Any, first
         builder.store(result, place, align=1)
         one = builder.insert_element(ir.Constant(spread, ir.Undefined), arguments[5], i32(0))
         every = builder.shuffle_vector(one, one, ir.Constant(indices, None))
-        return builder.bitcast(builder.icmp_unsigned("==", result, every), i32)
+        found = builder.bitcast(builder.icmp_unsigned("==", result, every), ir.IntType(count))
+        return builder.zext(found, i64) if count < i64.width else found
 
-    return types.uint32(width, word, byte, bins, first, level), generate
+    return types.uint64(width, word, byte, bins, first, level), generate
 
 
-_spread: Any = intrinsic(prefer_literal=True)(_spread_32)
+_spread: Any = intrinsic(prefer_literal=True)(_spread_24)

@@ -14,7 +14,8 @@ from decoders.formats import HEADER_708_BYTES, LONGEST_WORD_708_BITS
 
 HEADER_BITS: Final = 8 * HEADER_708_BYTES
 PROFILES_FILE: Final = Path(__file__).with_name("profiles.toml")
-BINS_AT_ONCE: Final = 32  # a kernel unpacks so many in one go
+FEWEST_BINS: Final = 64  # a kernel unpacks so many in one go
+BINS_IN_STEPS_OF: Final = 8  # of 3 or 6 bits are whole bytes
 
 Label = Annotated[int, Field(strict=True, ge=0, le=0o377)]
 Colour = Annotated[str, Field(pattern=r"^#[0-9a-f]{6}$")]
@@ -33,7 +34,7 @@ class Profile:
 
     name: str
     word_bits: Annotated[int, Field(strict=True, le=LONGEST_WORD_708_BITS)]
-    bins: Annotated[int, Field(strict=True, ge=BINS_AT_ONCE, multiple_of=BINS_AT_ONCE)]
+    bins: Annotated[int, Field(strict=True, ge=FEWEST_BINS, multiple_of=BINS_IN_STEPS_OF)]
     bits_per_bin: Literal[3, 6]
     labels: Annotated[tuple[Label, ...], Field(min_length=1)]
     scan_angle_zero: Literal["nose", "tail"]

@@ -351,11 +351,14 @@ def test_every_scan_angle_counts_from_the_zero_and_in_the_sense_of_the_profile(
     assert headers(array, profile).scan_angle_deg.tolist() == expected
 
 
-def test_a_profile_of_another_word_length_unpacks_its_own_words() -> None:
-    short = replace(load_profile("arinc708"), word_bits=64 + 96 * 3, bins=96)
-    payload = np.random.default_rng(1).bytes(36)
-    expected = [int.from_bytes(payload, "little") >> 3 * k & 7 for k in range(96)]
-    found = unpack(np.frombuffer(header708(range=4) + payload, np.uint8)[None], short)
+@pytest.mark.parametrize("bits", [3, 6])
+@pytest.mark.parametrize("bins", [64, 72, 96, 128, 200, 256])
+def test_a_profile_of_another_word_length_unpacks_its_own_words(bins: int, bits: int) -> None:
+    base = load_profile({3: "arinc708", 6: "wxr2100_6bit"}[bits])
+    other = replace(base, word_bits=64 + bins * bits, bins=bins)
+    payload = np.random.default_rng(1).bytes(bins * bits // 8)
+    expected = [int.from_bytes(payload, "little") >> bits * k & 2**bits - 1 for k in range(bins)]
+    found = unpack(np.frombuffer(header708(range=4) + payload, np.uint8)[None], other)
     assert (found.bins.tolist(), found.range_nm.tolist()) == ([expected], [20.0])
 
 
