@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from decoders import kernels429
-from decoders.definitions import CHARACTER_BITS, Definition, Definitions, load_definitions
+from decoders.definition_rows import CHARACTER_BITS
+from decoders.definitions import Definition, Definitions, load_definitions
 from decoders.formats import ORIENTATIONS, SSM_TABLES
 from decoders.results429 import Status, Values429, Words429
 

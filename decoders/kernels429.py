@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from decoders.definitions import CHARACTER_BITS
+from decoders.definition_rows import CHARACTER_BITS
 from decoders.formats import CLOCK_DIGITS, DATE_DIGITS, SSM_BCD_MINUS, TIME_FIELDS
 from decoders.results429 import Status
 

@@ -16,6 +16,7 @@ from decoders.health429 import Finding
 from decoders.racklink import MalformedBody, Packet, heartbeat, hello, radar_word, words429
 from gateway.config import RackConfig, profile_of
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
+from gateway.hearing import QUIET_NS, RADAR, Hearing
 from gateway.link import SPOILT, Channel429, Channel708, Link
 from gateway.records import Note, Raw, Record, Status, Tick
 from gateway.timebase import Timebase
@@ -24,10 +25,7 @@ from monitor.control_echo import ControlEcho
 from monitor.integrity import Comparison, Monitor, Verdict
 from monitor.scans import SILENCE_NS, Scan, ScanBuilder
 
-QUIET_NS = 5_000_000_000
 LATEST_DEVICE_NS = 1 << 62  # far beyond any clock, and far from overflow
-
-RADAR = "radar"  # the name under which the radar's silence is told, whatever its bridge still sends
 
 Watcher = Callable[[Scan, Verdict, Comparison | None], None]
 
@@ -57,9 +55,7 @@ class Pipeline:
         self._counters: Counter[str] = Counter()
         self._now_ns = 0  # common time of the latest word
         self._now_host_ns: int | None = None  # and when that word was read
-        self._heard: dict[str, int] = {}  # adapter, or the radar -> monotonic time of its last packet
-        self._chunk: dict[str, int] = {}  # adapter -> monotonic time of its last bytes, whatever they were
-        self._quiet: set[str] = set()
+        self._hearing = Hearing(self._links)
         self._users: dict[str, tuple[tuple[str, int], int]] = {}  # by role: adapter and channel, and when last heard
         self._unused: dict[tuple[str, int], str] = {}  # why a channel is not used, told already
         self._doubted: set[str] = set()  # quantities whose words seem to be read in a wrong way, told already
@@ -79,10 +75,10 @@ class Pipeline:
             yield from self._raw(record)
         elif isinstance(record, Status):
             self._counters[f"{record.adapter}.{record.state.lower()}"] += 1
-            if record.state == "UP":  # a line that never gives a byte is quiet too
-                self._heard.setdefault(record.adapter, record.stamp.monotonic_ns)
+            if record.state == "UP":
+                self._hearing.expect(record.adapter, record.stamp.monotonic_ns)
                 if self._monitor:
-                    self._heard.setdefault(RADAR, record.stamp.monotonic_ns)
+                    self._hearing.expect(RADAR, record.stamp.monotonic_ns)
             if record.state in ("LOST", "BEHIND", "FAILED"):
                 self._troubles[record.adapter] = f"degraded: {record.adapter} {record.state}: {record.reason}"
             yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, record.state, record.reason)
@@ -110,7 +106,7 @@ class Pipeline:
             return
         link.counters["chunks"] += 1
         link.dropped(record.dropped_before)
-        self._chunk[record.adapter] = record.stamp.monotonic_ns
+        self._hearing.bytes_came(record.adapter, record.stamp.monotonic_ns)
         for packet in link.framer.feed(record.data):
             yield from self._hear(record.adapter, record)
             if not link.count(packet):
@@ -121,12 +117,8 @@ class Pipeline:
                 link.counters["malformed_bodies"] += 1
 
     def _hear(self, source: str, record: Raw) -> Iterator[Event]:
-        self._heard[source] = record.stamp.monotonic_ns
-        if source in self._quiet:
-            self._quiet.discard(source)
-            yield StatusEvent(
-                record.stamp.utc_ns, record.sequence, source, "HEARD", f"{self._things(source)} come again"
-            )
+        if reason := self._hearing.heard(source, record.stamp.monotonic_ns):
+            yield StatusEvent(record.stamp.utc_ns, record.sequence, source, "HEARD", reason)
 
     def _packet(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         if packet.time_ns > LATEST_DEVICE_NS:
@@ -278,34 +270,21 @@ class Pipeline:
 
     def _tick(self, record: Tick) -> Iterator[Event]:
         stamp = record.stamp.utc_ns, record.sequence
-        for source, heard_ns in self._heard.items():
-            silent_ns = record.stamp.monotonic_ns - heard_ns
-            if source == RADAR and silent_ns > SILENCE_NS:
-                for scan in self._scans.finish():
-                    yield from self._judge(scan, record)
-            if silent_ns > QUIET_NS and source not in self._quiet:
-                self._quiet.add(source)
-                reason = self._quiet_reason(source, silent_ns, record)
-                yield StatusEvent(*stamp, source, "QUIET", reason)
-                if source == RADAR and self._monitor:
-                    silence = self._monitor.unavailable(self._scans.skip(), [f"radar: {reason}"])
-                    yield self._verdict(silence, self._monitor, record)
+        now_ns = record.stamp.monotonic_ns
+        if self._hearing.silent_ns(RADAR, now_ns) > SILENCE_NS:
+            for scan in self._scans.finish():
+                yield from self._judge(scan, record)
+        for source, reason in self._hearing.fell_silent(now_ns):
+            yield StatusEvent(*stamp, source, "QUIET", reason)
+            if source == RADAR and self._monitor:
+                silence = self._monitor.unavailable(self._scans.skip(), [f"radar: {reason}"])
+                yield self._verdict(silence, self._monitor, record)
         for quantity, doubt in self._aircraft.doubts().items():
             if quantity not in self._doubted:
                 self._doubted.add(quantity)
                 self._troubles[quantity] = f"degraded: {quantity}: {doubt}"
                 yield StatusEvent(*stamp, quantity, "STATE_DOUBT", doubt)
         yield self._state(record)
-
-    def _quiet_reason(self, source: str, silent_ns: int, record: Tick) -> str:
-        silent = f"no {self._things(source)} for {silent_ns / 1e9:.1f} s"
-        bytes_ns = self._chunk.get(source)
-        if bytes_ns is None or record.stamp.monotonic_ns - bytes_ns > QUIET_NS:
-            return silent
-        return f"{silent}, though bytes come: check the baud rate and that the bridge speaks RackLink"
-
-    def _things(self, source: str) -> str:
-        return "packets" if source in self._links else "words"
 
     def _state(self, record: Tick) -> StateEvent:
         heard_ns = self._now_host_ns
