@@ -31,6 +31,7 @@ from rich.progress import Progress, TaskID
 from rich.table import Table
 
 from gateway import events
+from gateway.config import profile_of
 from gateway.errors import GatewayError
 from gateway.metadata import recorded_config, recorded_monitor
 from gateway.recording import Recording
@@ -267,7 +268,8 @@ def _again(leg: Leg, stop: Stop) -> Flown:
     replay(recording, config, monitor, replayed.append, failures.append, watcher=watch, stop=stop)
     stop.obey()
     leg.identical = [event.to_json() + "\n" for event in replayed] == leg.lines and not failures
-    return Flown(leg.title, recording, monitor, replayed[0].time_ns, replayed[-1].time_ns, pictures)
+    profile = profile_of(config.radar_profile)
+    return Flown(leg.title, recording, monitor, profile, replayed[0].time_ns, replayed[-1].time_ns, pictures)
 
 
 def _table(legs: list[Leg], console: Console) -> None:

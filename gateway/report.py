@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import matplotlib as mpl
 import numpy as np
@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from decoders.profiles import Profile
 from gateway.console import clock
 from gateway.recording import Recording
 from monitor.calibration import Calibration
@@ -35,16 +36,23 @@ LEGEND = [
 
 
 class Palette(NamedTuple):
-    """What each colour of a picture means, and the values at which one gives way to the next."""
+    """The colours of a picture from the lowest value up, the values between which each lies, and what is explained."""
 
-    names: dict[str, str]
+    colours: tuple[str, ...]
     bounds: tuple[float, ...]
+    legend: dict[str, str]
+
+    @classmethod
+    def of_levels(cls, profile: Profile) -> Self:
+        """The radar's own colours; of many levels eight are explained."""
+        explained = np.linspace(0, len(profile.palette) - 1, NAMED_LEVELS).astype(int)
+        legend = {profile.level_names[level]: profile.palette[level] for level in explained}
+        return cls(profile.palette, tuple(level - 0.5 for level in range(len(profile.palette) + 1)), legend)
 
 
-LEVELS = Palette(
-    {"none": "#101418", "1": "#2f8f4e", "2": "#d7c32d", "3": "#c62828", "4 and up": "#b63bb6"}, (0, 1, 2, 3, 4, 64)
-)
-STATES = Palette({"before the first lit bin": "#c9d1d9", "shadow": "#101418", "lit": "#2f8f4e"}, (-4, -1, 0.5, 3))
+NAMED_LEVELS = 8
+STATE_COLOURS = {"before the first lit bin": "#c9d1d9", "shadow": "#101418", "lit": "#2f8f4e"}
+STATES = Palette(tuple(STATE_COLOURS.values()), (-4, -1, 0.5, 3), STATE_COLOURS)
 
 
 @dataclass(frozen=True)
@@ -59,11 +67,12 @@ class Picture:
 
 @dataclass(frozen=True)
 class Flown:
-    """One recording, the monitor that judged it, the UTC in ns of its first and last record, and its scans."""
+    """A recording and its scans, the monitor that judged them, the radar, the UTC in ns of first and last record."""
 
     title: str
     recording: Recording
     monitor: Monitor
+    profile: Profile
     began_ns: int
     ended_ns: int
     pictures: Sequence[Picture]
@@ -93,7 +102,7 @@ def write_report(directory: Path, legs: Sequence[Flown]) -> Path:
     for number, leg in enumerate(legs):
         for picture in leg.pictures[-1:]:
             name = f"scan_{number}.png"
-            _save(_ppi(leg.title, picture), directory / name)
+            _save(_ppi(leg, picture), directory / name)
             parts.append(_figure(name, _heading(leg.title, picture), _caption(leg.title, picture)))
     parts.append(_table(legs))
     page = directory / "index.html"
@@ -189,11 +198,11 @@ def _save(figure: Figure, path: Path) -> None:
     figure.savefig(path, dpi=110, bbox_inches="tight")
 
 
-def _ppi(title: str, picture: Picture) -> Figure:
+def _ppi(leg: Flown, picture: Picture) -> Figure:
     """Radar levels, and beside them both threads if there was a comparison."""
     scan, compared = picture.scan, picture.comparison
     shown: list[tuple[str, NDArray[np.float64], NDArray[np.uint8] | NDArray[np.int8], Palette]]
-    shown = [("radar levels", scan.scan_angle_deg, scan.bins, LEVELS)]
+    shown = [("radar levels", scan.scan_angle_deg, scan.bins, Palette.of_levels(leg.profile))]
     if compared:
         shown.append(("radar: lit and shadow", compared.scan_angle_deg, compared.radar_states, STATES))
         shown.append(("terrain: lit and shadow", compared.scan_angle_deg, compared.dem_states, STATES))
@@ -202,7 +211,7 @@ def _ppi(title: str, picture: Picture) -> Figure:
     for panel, (name, angle_deg, values, palette) in zip(panels, shown, strict=True):
         _polar(panel, angle_deg, values, scan.range_nm / scan.bins.shape[1], palette)
         panel.set_title(f"{name} (range in NM)", y=0.9)
-    figure.suptitle(_heading(title, picture))
+    figure.suptitle(_heading(leg.title, picture))
     return figure
 
 
@@ -217,12 +226,12 @@ def _polar(
     angle = np.radians(angle_deg[order])
     edges = np.r_[1.5 * angle[0] - 0.5 * angle[1], (angle[1:] + angle[:-1]) / 2, 1.5 * angle[-1] - 0.5 * angle[-2]]
     ranges = np.arange(values.shape[1] + 1) * width_nm
-    cmap, norm = ListedColormap(list(palette.names.values())), BoundaryNorm(palette.bounds, len(palette.names))
+    cmap, norm = ListedColormap(palette.colours), BoundaryNorm(palette.bounds, len(palette.colours))
     axes.pcolormesh(edges, ranges, values[order].T, cmap=cmap, norm=norm, rasterized=True)
     axes.set(theta_zero_location="N", theta_direction=-1, thetamin=-90, thetamax=90)
     axes.grid(visible=False)
-    named = [Patch(color=colour, label=name) for name, colour in palette.names.items()]
-    axes.legend(handles=named, loc="upper center", bbox_to_anchor=(0.5, 0.13), ncols=len(named), fontsize="small")
+    named = [Patch(facecolor=colour, edgecolor="#888888", label=name) for name, colour in palette.legend.items()]
+    axes.legend(handles=named, loc="upper center", bbox_to_anchor=(0.5, 0.13), ncols=4, fontsize="small")
 
 
 def _timeline(legs: Sequence[Flown]) -> Figure:

@@ -1,17 +1,14 @@
 """From records to events: what is used, what is refused and counted, and what is said of silence and loss."""
 
-from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TypeVar
 
-import numpy as np
 import pytest
 
 from decoders import formats as f
 from gateway.config import RackConfig, check_config
 from gateway.errors import GatewayError
-from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
+from gateway.events import IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
 from gateway.pipeline import Pipeline
 from gateway.records import Note, Record
 from monitor.integrity import Monitor
@@ -19,46 +16,29 @@ from monitor.terrain import open_terrain
 from simulators import arinc429, arinc708, racklink
 from tests.decoders.bus import word429
 from tests.gateway.conftest import TERRAIN
-from tests.gateway.made import GNSS, IRU, RADAR, Bridge, raw, stamp, status, tick
-
-E = TypeVar("E", bound=Event)
-RACK = check_config({"adapters": [{"name": "bridge", "source": "serial:x"}]}, "test")
-BINS = np.tile(np.arange(512) // 16 % 2, 1)
+from tests.gateway.made import (
+    BINS,
+    GNSS,
+    IRU,
+    RACK,
+    RADAR,
+    Bridge,
+    counters,
+    feed,
+    only,
+    position,
+    radial,
+    raw,
+    stamp,
+    status,
+    sweep,
+    tick,
+)
 
 
 @pytest.fixture(scope="module")
 def monitor() -> Monitor:
     return Monitor(open_terrain(TERRAIN))
-
-
-def feed(pipeline: Pipeline, *records: Record) -> list[Event]:
-    return [event for record in records for event in pipeline.feed(record)]
-
-
-def only(kind: type[E], events: Iterable[Event]) -> list[E]:
-    return [event for event in events if isinstance(event, kind)]
-
-
-def counters(pipeline: Pipeline) -> dict[str, int]:
-    (summary,) = only(SummaryEvent, pipeline.finish())
-    return summary.counters
-
-
-def position(latitude: float = 44.4, longitude: float = -71.7, ssm: int = 3) -> list[int]:
-    words = []
-    for coarse, fine, degrees in ((0o110, 0o120, latitude), (0o111, 0o121, longitude)):
-        words += [int(word[0]) for word in arinc429.encode_position(coarse, fine, [degrees], ssm=ssm)]
-    return words
-
-
-def radial(angle_deg: float, **changes: float) -> bytes:
-    return arinc708.encode(BINS, scan_angle_deg=angle_deg, tilt_deg=-2.0, range_nm=10.0)
-
-
-def sweep(bridge: Bridge, start_s: float, turn: bool = True) -> bytes:
-    """Ten radials to the right, and one back at the left that ends the sweep."""
-    angles = [*range(-15, 15, 3), *([-15] if turn else [])]
-    return b"".join(bridge.radar(start_s + 0.05 * k, radial(angle)) for k, angle in enumerate(angles))
 
 
 def test_statuses_and_notes_become_events_of_their_record() -> None:
@@ -231,57 +211,6 @@ def test_losses_appear_in_the_next_verdict_and_in_no_other(monitor: Monitor) -> 
     assert not [reason for event in only(IntegrityEvent, second) for reason in event.reasons if "degraded" in reason]
 
 
-def test_a_source_that_falls_quiet_is_told_once_and_again_when_it_is_heard() -> None:
-    bridge, pipeline = Bridge(), Pipeline(RACK, None)
-    feed(pipeline, raw(1, 0, bridge.heartbeat(0)))
-    events = feed(pipeline, *(tick(k + 2, k + 1.0) for k in range(8)), raw(20, 9.5, bridge.heartbeat(9)))
-    told = [(event.state, event.sequence, event.reason) for event in only(StatusEvent, events)]
-    assert told == [("QUIET", 7, "no packets for 6.0 s"), ("HEARD", 20, "packets come again")]
-
-
-def test_a_source_that_was_opened_and_never_heard_is_told_to_be_quiet() -> None:
-    pipeline = Pipeline(RACK, None)
-    events = feed(pipeline, status(0, 0, "UP"), *(tick(k, k) for k in range(1, 9)))
-    assert [event.adapter for event in only(StatusEvent, events) if event.state == "QUIET"] == ["bridge"]
-
-
-def test_a_line_that_gives_bytes_but_no_packets_is_told_to_be_quiet_with_what_to_check() -> None:
-    pipeline = Pipeline(RACK, None)
-    noise = (raw(2 * k, k + 0.5, bytes([0x5A, 0, 0xFF, 0]) * 20) for k in range(1, 9))
-    records = [record for k, chunk in enumerate(noise) for record in (tick(2 * k + 1, k + 1.0), chunk)]
-    events = feed(pipeline, status(0, 0, "UP"), *records)
-    (told,) = [event.reason for event in only(StatusEvent, events) if event.state == "QUIET"]
-    assert "though bytes come: check the baud rate" in told
-
-
-def test_a_silent_radar_ends_its_sweep_and_gives_an_unavailable_verdict(monitor: Monitor) -> None:
-    bridge, pipeline = Bridge(), Pipeline(RACK, monitor)
-    feed(pipeline, raw(1, 0, bridge.hello() + sweep(bridge, 0, turn=False)))
-    events: list[Event] = []
-    for second in range(1, 8):
-        events += feed(pipeline, raw(2 * second, second, bridge.heartbeat(second)), tick(2 * second + 1, second + 0.1))
-    assert [event.adapter for event in only(StatusEvent, events)] == ["radar"]
-    assert len(only(ScanEvent, events)) == 1
-    sweep_verdict, silence = only(IntegrityEvent, events)
-    assert silence.scan == sweep_verdict.scan + 1
-    assert silence.verdict == "unavailable"
-    assert any("no words for" in reason for reason in silence.reasons)
-
-
-def test_the_state_grows_old_when_words_stop_though_the_bridge_still_beats() -> None:
-    bridge, pipeline = Bridge(), Pipeline(RACK, None)
-    words = b"".join(bridge.words(GNSS, 0.2 * k, position()) for k in range(5))
-    feed(pipeline, raw(1, 1, bridge.hello() + words))
-    events: list[Event] = []
-    for second in range(2, 9):
-        events += feed(pipeline, raw(2 * second, second, bridge.heartbeat(second)), tick(2 * second + 1, second + 0.1))
-    states = only(StateEvent, events)
-    assert states[0].validity["latitude_deg"] == "NORMAL"
-    assert states[-1].validity["latitude_deg"] == "STALE"
-    ages = [state.age_s["latitude_deg"] for state in states]
-    assert ages == [pytest.approx(1.1 + k, abs=0.01) for k in range(7)]
-
-
 def test_inertial_words_give_attitude_in_degrees() -> None:
     bridge, pipeline = Bridge(), Pipeline(RACK, None)
     words = [arinc429.encode(0o324, -2.5), arinc429.encode(0o325, 10.0), arinc429.encode(0o314, 197.6 - 360)]
@@ -312,14 +241,6 @@ def test_a_bridge_that_starts_anew_takes_the_state_before_it_along() -> None:
     assert state.validity["latitude_deg"] == "MISSING"
 
 
-def test_a_radar_that_is_never_heard_is_unavailable(monitor: Monitor) -> None:
-    pipeline = Pipeline(RACK, monitor)
-    events = feed(pipeline, status(0, 0, "UP"), *(tick(k, k) for k in range(1, 9)))
-    (verdict,) = only(IntegrityEvent, events)
-    assert verdict.verdict == "unavailable"
-    assert "radar: no words" in verdict.reasons[0]
-
-
 def test_a_spoilt_word_does_not_make_its_channel_the_radar_in_use() -> None:
     bridge, pipeline = Bridge(), Pipeline(RACK, None)
     other = RADAR + 7
@@ -327,15 +248,6 @@ def test_a_spoilt_word_does_not_make_its_channel_the_radar_in_use() -> None:
     spoilt = bridge.packet(f.WORD_708, other, 0.1, racklink.word_708(radial(0)), f.FLAG_CODING)
     feed(pipeline, raw(0, 0, said + spoilt + bridge.radar(0.2, radial(0))))
     assert counters(pipeline)["bridge.words_708_unused"] == 1
-
-
-def test_another_channel_takes_over_once_the_one_in_use_is_silent() -> None:
-    bridge, pipeline = Bridge(), Pipeline(RACK, None)
-    other = IRU + 7
-    said = bridge.hello() + bridge.hello(body=racklink.hello(1, 1, [(other, f.KIND_429_HIGH, 0, 4)]))
-    feed(pipeline, raw(0, 0, said + bridge.words(IRU, 0.1, [0]) + bridge.words(other, 0.2, [0])))
-    feed(pipeline, raw(1, 10, bridge.words(other, 10.2, [0])))
-    assert counters(pipeline)["bridge.words_429_unused"] == 1
 
 
 def test_words_that_run_backwards_inside_a_packet_are_counted_and_not_used() -> None:
@@ -384,14 +296,6 @@ def test_findings_about_a_bus_are_events_and_counted() -> None:
     assert counters(pipeline)["bridge.channel_2.peak_words_per_s"] == 250
 
 
-def test_a_channel_that_falls_silent_is_told_although_its_bridge_goes_on() -> None:
-    bridge, pipeline = Bridge(), Pipeline(RACK, None)
-    feed(pipeline, raw(1, 0, bridge.hello() + bridge.words(GNSS, 0, position())))
-    records = [record for k in range(1, 9) for record in (raw(2 * k, k, bridge.heartbeat(k)), tick(2 * k + 1, k + 0.1))]
-    told = [event for event in only(StatusEvent, feed(pipeline, *records)) if event.state == "QUIET"]
-    assert [(event.adapter, event.reason) for event in told] == [("bridge/1", "no words for 5.1 s")]
-
-
 def test_a_position_joined_by_the_wrong_rule_is_told_and_degrades_the_next_verdict(monitor: Monitor) -> None:
     bridge, pipeline = Bridge(), Pipeline(RACK, monitor)
     records: list[Record] = [raw(0, 0, bridge.hello())]
@@ -416,79 +320,6 @@ def test_the_state_tells_utc_as_the_receiver_has_it() -> None:
     )
     assert state.values["utc_s"] == datetime(2026, 6, 1, 12, 0, 2, tzinfo=UTC).timestamp()
     assert state.validity["utc_s"] == "NORMAL"
-
-
-PANEL_CHANNEL = 5
-
-
-def panel_rack(definitions: str = "wxr_panel", **monitor: float) -> RackConfig:
-    channels = {PANEL_CHANNEL: {"kind": "arinc429", "definitions": definitions}}
-    table = {"adapters": [{"name": "bridge", "source": "serial:x", "channels": channels}], "monitor": monitor}
-    return RackConfig.model_validate(table)
-
-
-def panel(bridge: Bridge, time_s: float, tilt_deg: float) -> bytes:
-    """Both control words: stabilised, map, calibrated gain, 10 NM."""
-    first = 1 << 2 | 2 << 3 | (round(tilt_deg * 4) & 0x7F) << 6 | 63 << 13
-    words = [arinc429.encode(0o270, data=first), arinc429.encode(0o271, data=2 << 13)]
-    return bridge.words(PANEL_CHANNEL, time_s, words)
-
-
-def echoes(pipeline: Pipeline, tilts: Iterable[float]) -> list[StatusEvent]:
-    """What is told of a panel that asks for each tilt for two seconds of a radar that stays at -2 deg and 10 NM."""
-    bridge = Bridge()
-    stream = bridge.hello()
-    for k, tilt in enumerate(tilts):
-        for tenth in range(20):
-            time_s = 2.0 * k + tenth / 10
-            stream += panel(bridge, time_s, tilt) + bridge.radar(time_s + 0.05, radial(tenth))
-    return [event for event in only(StatusEvent, feed(pipeline, raw(1, 0, stream))) if "ECHO" in event.state]
-
-
-def test_a_radar_that_does_not_do_what_its_panel_asks_is_told_once_and_counted() -> None:
-    pipeline = Pipeline(panel_rack(), None)
-    told = echoes(pipeline, [-2.0, 3.0, -2.0])
-    assert [(event.adapter, event.state, event.reason) for event in told] == [
-        ("bridge", "ECHO_MISMATCH", "tilt_deg: panel 3, radar -2"),
-        ("bridge", "ECHO_AGREES", "the radar does what its panel asks"),
-    ]
-    found = counters(pipeline)
-    assert found["bridge.echo_mismatch"] == 1
-    assert found["radials_unlike_command"] == 10
-
-
-def test_the_delay_that_a_radar_may_take_is_the_rack_s() -> None:
-    assert not echoes(Pipeline(panel_rack(control_delay_s=3.0), None), [3.0, 4.0])
-    pipeline = Pipeline(panel_rack(control_delay_s=0.0), None)
-    assert len(echoes(pipeline, [3.0])) == 1
-    assert counters(pipeline)["radials_unlike_command"] == 20
-
-
-def test_a_radar_that_comes_round_to_its_panel_is_told() -> None:
-    bridge, pipeline = Bridge(), Pipeline(panel_rack(), None)
-    stream = bridge.hello() + panel(bridge, 0.0, 3.0) + bridge.radar(1.5, radial(0))
-    other = arinc708.encode(BINS, scan_angle_deg=1.0, tilt_deg=3.0, range_nm=10.0)
-    events = feed(pipeline, raw(1, 0, stream + bridge.radar(2.0, other)))
-    assert [event.state for event in only(StatusEvent, events)] == ["ECHO_MISMATCH", "ECHO_AGREES"]
-
-
-def test_control_words_that_are_not_normal_ask_for_nothing() -> None:
-    bridge, pipeline = Bridge(), Pipeline(panel_rack(), None)
-    bad = [
-        arinc429.encode(0o270, data=0, ssm=1),
-        arinc429.encode(0o270, data=0) ^ 1 << 31,
-        arinc429.encode(0o200, data=0),
-    ]
-    stream = bridge.hello() + bridge.words(PANEL_CHANNEL, 0.0, bad) + bridge.radar(2.0, radial(0))
-    assert not only(StatusEvent, feed(pipeline, raw(1, 0, stream)))
-    assert counters(pipeline)["radials_unlike_command"] == 0
-
-
-def test_a_command_of_before_the_clock_restarted_is_forgotten() -> None:
-    bridge, pipeline = Bridge(), Pipeline(panel_rack(), None)
-    stream = bridge.hello(100) + panel(bridge, 100.0, 3.0) + bridge.radar(0.1, radial(0)) + bridge.radar(1.6, radial(1))
-    told = only(StatusEvent, feed(pipeline, raw(1, 0, stream)))
-    assert [event.state for event in told] == ["CLOCK_RESTARTED"]
 
 
 def test_units_that_the_state_cannot_convert_are_told_and_break_nothing(tmp_path: Path) -> None:
