@@ -122,6 +122,8 @@ def _profile(path: Path, name: str, table: object) -> Profile:
     where = f"{path} [{name}]"
     if not isinstance(table, dict):
         raise ProfileError(f"{where}: a profile is a table of settings, not {table!r}")
+    if "name" in table:
+        raise ProfileError(f"{where} name: a profile is called what its table is called; leave the key out")
     try:
         return Profile(**_inherited(where, table) | {"name": name})
     except ValidationError as error:

@@ -87,6 +87,7 @@ def test_a_profile_of_ones_own_extends_a_named_one(tmp_path: Path) -> None:
         ("", "mine.toml has 0 tables"),
         ('[a]\nextends = "arinc708"\n[b]\n', "mine.toml has 2 tables"),
         ("a = 3", r"mine.toml \[a\]: a profile is a table"),
+        ('[a]\nextends = "arinc708"\nname = "b"', r"mine.toml \[a\] name: a profile is called what its table"),
         ("[a", "mine.toml is no TOML"),
         ("[a]\nbins = 512", r"mine.toml \[a\] word_bits: .*[Ff]ield required|[Mm]issing"),
         ('[a]\nextends = "arinc709"', r"mine.toml \[a\] extends: no profile 'arinc709': use one of"),
