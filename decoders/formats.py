@@ -29,6 +29,17 @@ KIND_708: Final = 0x70
 
 ORIENTATIONS: Final = ("wire", "label_swapped")  # of a 429 label; the index is the code in a hello
 
+# --- RackLink 1 over CAN: extended identifiers, from the highest bit 5 bits prefix, 8 channel, 4 kind, 12 index -------
+CAN_PREFIX: Final = 0b10110
+CAN_WORD_429: Final = 0  # index: the low byte of the word
+CAN_WORD_708: Final = 1  # index: number of the segment, from 0
+CAN_HEARTBEAT: Final = 2  # index 0
+CAN_429: Final = "<II"  # word, device time in us, its low 32 bits; struct notation
+CAN_COUNTS: Final = "<II"  # words received, words lost
+CAN_708_HEAD: Final = "<QHB"  # time_ns, bit count, flags; the word's bytes follow
+CAN_SEGMENT_BYTES: Final = {"classic": 7, "fd": 63}  # of head and word in a frame, behind the word counter (u8)
+CAN_FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)  # a last segment is padded up to one of them
+
 # --- ARINC 429 --------------------------------------------------------------------------------------------------------
 LOW_SPEED_BIT_NS: Final = 80_000  # 12.5 kbit/s
 HIGH_SPEED_BIT_NS: Final = 10_000  # 100 kbit/s
