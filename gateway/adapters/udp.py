@@ -18,6 +18,7 @@ HEAD = struct.Struct(f.DATAGRAM_RECORD)
 LARGEST_DATAGRAM = 65_535
 MOST_AT_ONCE = 512
 ANY = "any"
+DEFAULT_INTERFACE = "0.0.0.0"  # noqa: S104 # the one that the kernel's routes choose, for a multicast group
 
 MENDS = {
     errno.EADDRINUSE: "in use: another program listens there",
@@ -66,10 +67,11 @@ class UdpPort:
 class UdpAdapter:
     """A local address to listen at; a multicast group is joined."""
 
-    def __init__(self, host: str, port: int, senders: frozenset[str]) -> None:
+    def __init__(self, host: str, port: int, senders: frozenset[str], interface: str) -> None:
         self.host = host
         self.port = port
         self.senders = senders
+        self.interface = interface
 
     def open(self) -> UdpPort:
         """Bind the socket. Raises GatewayError with the mend."""
@@ -78,7 +80,7 @@ class UdpAdapter:
             prepare(line, RECEIVE_BYTES)
             if ipaddress.ip_address(self.host).is_multicast:
                 line.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                group = socket.inet_aton(self.host) + socket.inet_aton("0.0.0.0")  # noqa: S104 # the default interface
+                group = socket.inet_aton(self.host) + socket.inet_aton(self.interface)
                 line.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
             line.bind((self.host, self.port))
         except OSError as error:
@@ -89,7 +91,7 @@ class UdpAdapter:
 
 
 def make(address: str, config: AdapterConfig) -> UdpAdapter:  # noqa: ARG001 # every kind is made alike
-    """The adapter of `udp:HOST:PORT` or `udp:HOST:PORT?from=ADDRESS,ADDRESS`.
+    """The adapter of `udp:HOST:PORT`, or with `?from=ADDRESS,ADDRESS` and, for a multicast group, `&interface=ADDRESS`.
 
     Beyond the loopback interface it must be said who may send. Raises GatewayError for any other address.
     """
@@ -97,7 +99,10 @@ def make(address: str, config: AdapterConfig) -> UdpAdapter:  # noqa: ARG001 # e
         parts = urlsplit(f"//{address}")
         host, port = ipaddress.IPv4Address(parts.hostname or ""), parts.port
         options = dict(parse_qsl(parts.query, strict_parsing=bool(parts.query)))
-        said = options.pop("from", "")
+        said, interface = (
+            options.pop("from", ""),
+            str(ipaddress.IPv4Address(options.pop("interface", DEFAULT_INTERFACE))),
+        )
         senders = frozenset(str(ipaddress.IPv4Address(sender)) for sender in said.split(",") if said not in ("", ANY))
     except ValueError as error:
         raise GatewayError(f"udp {address}: {error}: write udp:127.0.0.1:PORT?from=ADDRESS") from error
@@ -107,4 +112,4 @@ def make(address: str, config: AdapterConfig) -> UdpAdapter:  # noqa: ARG001 # e
         raise GatewayError(
             f"udp {address}: others can reach it, so say who may send: ?from=ADDRESS, several with commas, or ?from=any"
         )
-    return UdpAdapter(str(host), port, senders)
+    return UdpAdapter(str(host), port, senders, interface)
