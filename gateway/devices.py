@@ -42,7 +42,7 @@ def serial_lines(ports: Iterable[ListPortInfo], root: Path = Path("/")) -> list[
             f"serial:{lasting.get(Path(port.device).resolve(), port.device)}",
             "" if port.vid is None else f"{port.vid:04x}:{port.pid:04x}",
             port.serial_number or "",
-            "" if port.description == "n/a" else port.description,
+            "" if port.description in ("n/a", port.name) else port.description,  # where it has none of its own
         )
         for port in sorted(ports)
     ]

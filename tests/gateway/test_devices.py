@@ -81,7 +81,9 @@ def test_a_serial_line_goes_by_the_name_that_lasts(tmp_path: Path) -> None:
 
 
 def test_a_serial_line_without_a_lasting_name_goes_by_its_device(tmp_path: Path) -> None:
-    assert serial_lines([port("/dev/ttyS0")], tmp_path) == [Device("serial:/dev/ttyS0", "", "", "")]
+    assert serial_lines([port("/dev/ttyS0", description="ttyS0")], tmp_path) == [
+        Device("serial:/dev/ttyS0", "", "", "")
+    ]
 
 
 def test_a_bridge_on_usb_goes_by_its_serial_number_and_other_devices_are_left_out() -> None:
