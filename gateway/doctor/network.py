@@ -6,7 +6,7 @@ from gateway.doctor.finding import Finding
 from gateway.kernel_devices import CanInterface, can_interfaces
 
 LEAST_BYTES = {  # by setting of the kernel
-    "rmem_max": 4 << 20,  # what an adapter may ask for: a second of a bridge while this machine is busy
+    "rmem_max": 4 << 20,  # the most that an adapter gets: a second of a bridge while this machine is busy
     "rmem_default": 212_992,  # the kernel's own, where nobody has made it smaller
 }
 SYSCTL_FILE = "/etc/sysctl.d/70-shadebus.conf"
