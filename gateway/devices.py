@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import quote
 
 import libusb_package
 import usb.core
@@ -63,7 +64,8 @@ def _bridge(device: Any) -> Device:
         number, product = device.serial_number or "", device.product or ""
     except (usb.core.USBError, ValueError):  # pyusb raises either where it may not open the device
         return Device(f"usb:{BRIDGE}", BRIDGE, "", HIDDEN)
-    return Device(f"usb:{BRIDGE}:{number}" if number else f"usb:{BRIDGE}", BRIDGE, number, product)
+    source = f"usb:{BRIDGE}:{quote(number, safe='')}" if number else f"usb:{BRIDGE}"
+    return Device(source, BRIDGE, number, product)
 
 
 def can_devices(root: Path = Path("/")) -> list[Device]:

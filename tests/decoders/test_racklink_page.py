@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from cobs import cobs
 
+from decoders.can_frames import Recorded
+from decoders.datagrams import DatagramFramer
 from decoders.racklink import (
     ChannelCount,
     Framer,
@@ -21,6 +23,7 @@ from decoders.racklink import (
     time_mark,
     words429,
 )
+from decoders.racklink_can import CanFramer
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "racklink.md").read_text(encoding="utf-8")
@@ -109,6 +112,24 @@ def test_the_senders_write_the_packets_of_the_page() -> None:
     sender = ROOT / "examples" / "sender" / "sender.py"
     sent = subprocess.run([sys.executable, "-I", "-S", sender], capture_output=True, check=True).stdout
     assert sent == b"".join(frame(name) for name in PACKETS)
+
+
+def test_our_decoders_take_the_datagram_for_the_heartbeat() -> None:
+    datagram = frame("datagram")
+    assert DatagramFramer().feed(struct.pack("<QH", 0, len(datagram)) + datagram) == [packet("heartbeat")]
+
+
+def test_our_decoders_make_packets_of_the_can_frames() -> None:
+    lines = [line for name in ("can429", "canfd708", "canheartbeat") for line in can_frames(name)]
+    chunk = b"".join(struct.pack("<QIBB", 0, 1 << 31 | number, 0, len(data)) + data for number, data in lines)
+    framer = CanFramer(Recorded())
+    said = {one.type: one for one in framer.feed(chunk)}
+    assert words429(said[0x10]).words.tolist() == [0x600C808B]
+    assert radar_word(said[0x20]) == (1600, WORD_708)
+    assert said[0x20].time_ns - said[0x10].time_ns == 2_000_000
+    assert heartbeat(said[0x02]) == (ChannelCount(1, 2, 2),)
+    assert [said[kind].channel for kind in (0x10, 0x20, 0x02)] == [1, 0, 1]
+    assert framer.framed == framer.received
 
 
 def test_the_can_frame_of_an_arinc_429_word_has_its_low_byte_in_the_identifier() -> None:

@@ -2,64 +2,47 @@
 
 import errno
 import json
-from array import array
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 import usb.core
 from serial.tools.list_ports_common import ListPortInfo
 from typer.testing import CliRunner
-from usb.backend import IBackend
 
 from gateway import devices
+from gateway.adapters import make_adapter
+from gateway.adapters.usb import UsbAdapter
 from gateway.cli import app
 from gateway.config import AdapterConfig
 from gateway.devices import Device, can_devices, plugged_in, serial_lines, usb_bridges
+from simulators.outlets.usb import Handle, Plug, UsbBackend, UsbDevice
 from tests.gateway.machine import interface
 
-STRINGS = {1: "S-0042", 2: "Bus bridge"}
+
+class Locked(UsbBackend):
+    """Bridges that this user may not open."""
+
+    def open_device(self, dev: Plug) -> Handle:
+        raise usb.core.USBError("Access denied", -3, errno.EACCES)
 
 
-class Wire(IBackend):  # type: ignore[misc]
-    """USB with a keyboard and a bridge; opening the bridge may be forbidden."""
+class Described(UsbBackend):
+    """Devices whose descriptor says something else."""
 
-    def __init__(self, allowed: bool = True, serial_index: int = 1) -> None:
-        self.allowed = allowed
-        self.serial_index = serial_index
+    said: ClassVar[dict[str, int]] = {}
 
-    def enumerate_devices(self) -> Iterator[tuple[int, int]]:
-        yield from ((0x046D, 0xC31C), (0x1209, 0x7080))
+    def get_device_descriptor(self, dev: Plug) -> SimpleNamespace:
+        return SimpleNamespace(**{**vars(super().get_device_descriptor(dev)), **self.said})
 
-    def get_parent(self, dev: tuple[int, int]) -> None:
-        return None
 
-    def get_device_descriptor(self, dev: tuple[int, int]) -> SimpleNamespace:
-        names = (
-            "bLength bDescriptorType bcdUSB bDeviceClass bDeviceSubClass bDeviceProtocol bMaxPacketSize0 bcdDevice "
-            "iManufacturer bNumConfigurations address bus port_number port_numbers speed"
-        )
-        said = {"idVendor": dev[0], "idProduct": dev[1], "iSerialNumber": self.serial_index, "iProduct": 2}
-        return SimpleNamespace(**dict.fromkeys(names.split(), 0), **said)
+class Keyboards(Described):
+    said: ClassVar = {"idVendor": 0x046D, "idProduct": 0xC31C}
 
-    def open_device(self, dev: tuple[int, int]) -> object:
-        if not self.allowed:
-            raise usb.core.USBError("Access denied", -3, errno.EACCES)
-        return dev
 
-    def close_device(self, handle: object) -> None:
-        pass
-
-    def ctrl_transfer(
-        self, handle: object, request_type: int, request: int, value: int, index: int, data: "array[int]", timeout: int
-    ) -> int:
-        number = value & 0xFF
-        text = STRINGS[number].encode("utf-16-le") if number else b"\x09\x04"
-        answer = bytes([len(text) + 2, 3]) + text
-        data[: len(answer)] = array("B", answer)
-        return len(answer)
+class Unnumbered(Described):
+    said: ClassVar = {"iSerialNumber": 0}
 
 
 def port(device: str, **said: object) -> ListPortInfo:
@@ -86,16 +69,30 @@ def test_a_serial_line_without_a_lasting_name_goes_by_its_device(tmp_path: Path)
     ]
 
 
-def test_a_bridge_on_usb_goes_by_its_serial_number_and_other_devices_are_left_out() -> None:
-    assert usb_bridges(Wire()) == [Device("usb:1209:7080:S-0042", "1209:7080", "S-0042", "Bus bridge")]
+def test_a_bridge_on_usb_goes_by_its_serial_number() -> None:
+    assert usb_bridges(UsbBackend([UsbDevice("S-42"), UsbDevice("S-43")])) == [
+        Device("usb:1209:7080:S-42", "1209:7080", "S-42", "simulated bridge"),
+        Device("usb:1209:7080:S-43", "1209:7080", "S-43", "simulated bridge"),
+    ]
+
+
+def test_a_serial_number_with_a_slash_is_written_so_that_the_adapter_reads_it() -> None:
+    (found,) = usb_bridges(UsbBackend([UsbDevice("7/a: 50%")]))
+    adapter = make_adapter(AdapterConfig(name="bridge", source=found.source))
+    assert isinstance(adapter, UsbAdapter)
+    assert (adapter.serial, adapter.interface) == ("7/a: 50%", None)
 
 
 def test_a_bridge_without_a_serial_number_goes_by_its_kind() -> None:
-    assert usb_bridges(Wire(serial_index=0)) == [Device("usb:1209:7080", "1209:7080", "", "Bus bridge")]
+    assert usb_bridges(Unnumbered([UsbDevice()])) == [Device("usb:1209:7080", "1209:7080", "", "simulated bridge")]
+
+
+def test_other_devices_on_usb_are_left_out() -> None:
+    assert usb_bridges(Keyboards([UsbDevice()])) == []
 
 
 def test_a_bridge_that_may_not_be_opened_is_listed_with_the_reason() -> None:
-    (found,) = usb_bridges(Wire(allowed=False))
+    (found,) = usb_bridges(Locked([UsbDevice()]))
     assert found == Device("usb:1209:7080", "1209:7080", "", "no permission to ask for more: see `shadebus doctor`")
 
 
@@ -143,15 +140,13 @@ def test_the_verb_prints_a_table_or_json_lines_of_sources_that_a_rack_file_takes
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     interface(tmp_path, "can0")
-    found: tuple[list[Device], list[str]] = ([*usb_bridges(Wire()), *can_devices(tmp_path)], [])
+    found: tuple[list[Device], list[str]] = ([*usb_bridges(UsbBackend([UsbDevice()])), *can_devices(tmp_path)], [])
     monkeypatch.setattr(devices, "plugged_in", lambda: found)
     lines: list[dict[str, Any]] = list(
         map(json.loads, CliRunner().invoke(app, ["devices", "--json"]).stdout.splitlines())
     )
     assert [Device(**line) for line in lines] == found[0]
-    assert [AdapterConfig(name="bridge", source=line["source"]).source for line in lines] == [
-        "usb:1209:7080:S-0042",
-        "can:socketcan:can0",
-    ]
+    for line in lines:
+        make_adapter(AdapterConfig(name="bridge", source=line["source"]))
     table = CliRunner().invoke(app, ["devices"]).stdout
     assert all(one.source in table for one in found[0])
