@@ -12,7 +12,7 @@ import pytest
 from mcap.writer import Writer
 
 from gateway.config import check_config
-from gateway.doctor import permission_mend
+from gateway.doctor.serial import permission_mend
 from gateway.metadata import build_monitor, describe
 from gateway.recording import Recorder
 from simulators.outlets import PtyOutlet
