@@ -186,6 +186,15 @@ def test_a_packet_that_finds_the_fifo_full_is_lost_in_the_device_and_the_ledger_
     assert bytes(opened(device).read(ENDPOINT, 8 * PACKET_BYTES, 100)) == frame
 
 
+@pytest.mark.parametrize("spoilt", [b"", b"\0", b"\7abc\0", b"\1\1\1\0"])
+def test_a_spoilt_packet_that_finds_the_fifo_full_counts_as_lost_on_the_link(spoilt: bytes) -> None:
+    ledger = Ledger()
+    (frame,) = carriers.stream().units(Packet(0x10, 1, 0, 0, 0, bytes(8)))
+    for lost in (spoilt, frame[:10], frame[:-2] + b"\x55\0"):
+        ledger.lose_frame(lost)
+    assert ledger == Ledger()
+
+
 def test_the_heartbeats_of_a_bridge_whose_fifo_overflows_are_right_to_the_word() -> None:
     ledger = Ledger()
     device = UsbDevice(fifo_bytes=2000)
