@@ -40,6 +40,13 @@ CAN_708_HEAD: Final = "<QHB"  # time_ns, bit count, flags; the word's bytes foll
 CAN_SEGMENT_BYTES: Final = {"classic": 7, "fd": 63}  # of head and word in a frame, behind the word counter (u8)
 CAN_FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)  # a last segment is padded up to one of them
 
+# --- Recorded chunks of devices that give messages instead of a stream: for each message this head, and its bytes -----
+DATAGRAM_RECORD: Final = "<QH"  # monotonic host time of arrival in ns, length; struct notation
+CAN_RECORD: Final = "<QIBB"  # that time, identifier with SocketCAN's flags, SocketCAN's FD flags, length
+CAN_EXTENDED: Final = 0x8000_0000  # SocketCAN's flags of an identifier
+CAN_REMOTE: Final = 0x4000_0000
+CAN_ERROR: Final = 0x2000_0000
+
 # --- ARINC 429 --------------------------------------------------------------------------------------------------------
 LOW_SPEED_BIT_NS: Final = 80_000  # 12.5 kbit/s
 HIGH_SPEED_BIT_NS: Final = 10_000  # 100 kbit/s

@@ -9,13 +9,31 @@ import struct
 import zlib
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, ClassVar, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from cobs import cobs
 
 from decoders import formats as f
+from decoders.framing import Packet, PacketFramer
+
+__all__ = [
+    "ChannelCount",
+    "Framer",
+    "Hello",
+    "HelloChannel",
+    "MalformedBody",
+    "Packet",
+    "RadarWord",
+    "TimedWords",
+    "heartbeat",
+    "hello",
+    "parsed",
+    "radar_word",
+    "time_mark",
+    "words429",
+]
 
 VERSION: Final = f.LINK_VERSION
 SHORTEST: Final = f.LINK_HEADER_BYTES + f.LINK_CRC_BYTES
@@ -29,17 +47,6 @@ TIME_LIMIT_NS: Final = 2**63 - 2**32  # a device time above it, 292 years, would
 
 class MalformedBody(ValueError):
     """The body of an intact packet contradicts the packet's type."""
-
-
-class Packet(NamedTuple):
-    """An intact packet, of a known type or not. `time_ns` is the device clock at the start of the first word."""
-
-    type: int
-    channel: int
-    flags: int
-    sequence: int
-    time_ns: int
-    body: bytes
 
 
 class TimedWords(NamedTuple):
@@ -83,7 +90,7 @@ class ChannelCount(NamedTuple):
     lost: int
 
 
-class Framer:
+class Framer(PacketFramer):
     """Cuts a byte stream into packets; the outcome does not depend on how the stream is cut into pieces.
 
     Bytes: `received` = `framed` + `skipped` + `pending` after every call. `framed` counts intact packets with their
@@ -95,8 +102,10 @@ class Framer:
     run is searched for a packet that ends it, and noise costs no more than itself.
     """
 
+    NAMES: ClassVar = (*PacketFramer.NAMES, "bad_crc", "bad_cobs", "oversize", "unknown_version")
+
     def __init__(self) -> None:
-        self.received = self.framed = self.skipped = 0
+        super().__init__()
         self.bad_crc = self.bad_cobs = self.oversize = self.unknown_version = 0
         self._run = bytearray()  # since the last 0x00, or its newest bytes if it is over-long
         self._overlong = False
@@ -105,18 +114,6 @@ class Framer:
     def pending(self) -> int:
         """Bytes kept for the next call."""
         return len(self._run)
-
-    def counters(self) -> dict[str, int]:
-        """Every counter by name."""
-        names = ("received", "framed", "skipped", "pending", "bad_crc", "bad_cobs", "oversize", "unknown_version")
-        return {name: getattr(self, name) for name in names}
-
-    def succeed(self, before: "Framer") -> None:
-        """Take over the counts of a framer that is given up; what it still had pending counts as skipped."""
-        for name, count in before.counters().items():
-            if name != "pending":
-                setattr(self, name, count)
-        self.skipped += before.pending
 
     def feed(self, data: bytes) -> list[Packet]:
         """Packets completed by the next bytes of a stream (COBS, each closed by 0x00)."""
@@ -140,13 +137,6 @@ class Framer:
                 packets += self._close(run)
         self.framed += framed
         self._extend(rest)
-        self._check_books()
-        return packets
-
-    def feed_datagram(self, data: bytes) -> list[Packet]:
-        """The packet of one UDP datagram, which has neither COBS nor a closing 0x00."""
-        self.received += len(data)
-        packets = self._account(_parsed(data), len(data))
         self._check_books()
         return packets
 
@@ -192,10 +182,6 @@ class Framer:
             setattr(self, outcome, getattr(self, outcome) + 1)
         return []
 
-    def _check_books(self) -> None:
-        if self.received != self.framed + self.skipped + self.pending:
-            raise AssertionError(f"framer lost count of its bytes: {self.counters()}")
-
 
 Fault = Literal["bad_crc", "bad_cobs", "oversize", "unknown_version"]
 
@@ -203,13 +189,13 @@ Fault = Literal["bad_crc", "bad_cobs", "oversize", "unknown_version"]
 def _unstuffed(run: bytes) -> Packet | Fault:
     """The packet of a run without its closing 0x00."""
     try:
-        return _parsed(cobs.decode(run))
+        return parsed(cobs.decode(run))
     except cobs.DecodeError:
         return "bad_cobs"
 
 
-def _parsed(packet: bytes) -> Packet | Fault:
-    """The packet of bytes without COBS."""
+def parsed(packet: bytes) -> Packet | Fault:
+    """The packet of bytes without COBS, or what is wrong with them."""
     if len(packet) > LONGEST:
         return "oversize"
     if len(packet) < SHORTEST or zlib.crc32(packet) != CRC_RESIDUE:

@@ -117,10 +117,21 @@ class AdapterConfig(_Section):
 
     name: Annotated[str, AfterValidator(_not_ours)] = Field(pattern=r"^[A-Za-z0-9_-]+$")
     source: str = Field(
-        pattern=r"^[a-z0-9]+:.+", description="serial:DEVICE, serial:socket://..., serial:rfc2217://..."
+        pattern=r"^[a-z0-9]+:.+",
+        description="serial:DEVICE, serial:socket://..., serial:rfc2217://..., usb:VID:PID:SERIAL, "
+        "can:INTERFACE:CHANNEL, udp:HOST:PORT",
+    )
+    framing: Literal["racklink", "bare708"] = Field(
+        "racklink", description="bare708 for a UDP sender whose datagrams are radar words and nothing else"
     )
     baud: int = Field(921_600, ge=300, le=12_000_000, description="bit/s of a serial line")
     channels: dict[ChannelNumber, ChannelConfig] = Field(default_factory=dict, description="by channel number")
+
+    @model_validator(mode="after")
+    def _bare_words_come_by_udp(self) -> Self:
+        if self.framing == "bare708" and not self.source.startswith("udp:"):
+            raise ValueError('framing "bare708" is for udp sources: leave it out')
+        return self
 
 
 class RecordingConfig(_Section):

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from gateway.adapters import Reading
 from gateway.queues import OVERHEAD_BYTES, ByteQueue
 from gateway.recording import Recorder
 from gateway.records import Note, Raw, Record, Stamp, Status, Tick
@@ -61,13 +62,13 @@ class Journal:
         self._last_tick_ns = self._last_sync_ns = time.monotonic_ns()
         self._utc_offset_ns: int | None = None
 
-    def chunk(self, adapter: str, data: bytes) -> None:
-        """Take bytes from an adapter's thread; without room they are dropped, and the next chunk says how many."""
-        dropped = self._dropped.get(adapter, 0)
-        if self.queue.put(Chunk(now(), adapter, data, dropped), len(data) + OVERHEAD_BYTES):
+    def chunk(self, adapter: str, reading: Reading) -> None:
+        """Take what an adapter's thread has read; without room it is dropped, and the next chunk says how much."""
+        lost = self._dropped.get(adapter, 0) + reading.lost
+        if self.queue.put(Chunk(now(), adapter, reading.data, lost), len(reading.data) + OVERHEAD_BYTES):
             self._dropped[adapter] = 0
         else:
-            self._dropped[adapter] = dropped + len(data)
+            self._dropped[adapter] = lost + reading.units
 
     def report(self, adapter: str, state: str, reason: str = "") -> None:
         """Take a change of state from any thread; what the adapter had to drop is told first."""

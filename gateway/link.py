@@ -1,6 +1,6 @@
 """One bridge as the gateway knows it: its channels, its packet counter, its losses."""
 
-from collections import Counter
+from collections import Counter, defaultdict, deque
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -11,13 +11,17 @@ from decoders import arinc429, control708
 from decoders import formats as f
 from decoders.arinc429 import JoinRule
 from decoders.definitions import Definitions, for_equipment, load_definitions
+from decoders.framing import Packet, PacketFramer
 from decoders.health429 import EQUIPMENT, BusHealth
 from decoders.profiles import Profile
-from decoders.racklink import ChannelCount, Framer, Hello, Packet, words429
+from decoders.racklink import ChannelCount, Hello, words429
 from gateway.config import AdapterConfig, definitions_of, profile_of
+from gateway.framing import form_of
 from monitor.utc import TIME, UTC_LABELS
 
 SEQUENCE_RANGE = 1 << 32
+LARGEST_LEAP = 1 << 24  # words from a heartbeat to the next: twenty minutes of a full rack
+RECENT = 32  # packets among which a network may repeat or overtake one
 FLAG_NAMES = {
     f.FLAG_FIFO_OVERFLOW: "fifo_overflow",
     f.FLAG_PARITY: "parity_error",
@@ -70,21 +74,47 @@ class Channel708:
 
 
 @dataclass
+class Sent:
+    """What a bridge says that it sent on a channel, against what arrived.
+
+    A heartbeat continues that one of the two before it from which it is nearer ahead. So a single wrong one, as a line
+    without a checksum may give it, is put right by the next; one that continues neither is of a bridge that began anew.
+    """
+
+    missing: int = 0
+    _before: list[tuple[int, int]] = field(default_factory=list)  # said, and expected to have arrived by then
+
+    def say(self, received: int, arrived: int) -> int:
+        """Take the next heartbeat; how many more words are missing than before it, or fewer."""
+        ahead = [((received - said) % SEQUENCE_RANGE, expected) for said, expected in self._before]
+        more, expected = min(ahead, default=(LARGEST_LEAP, 0))
+        now_expected = expected + more if more < LARGEST_LEAP else arrived + self.missing
+        self._before = [*self._before[-1:], (received, now_expected)]
+        change = max(now_expected - arrived, 0) - self.missing
+        self.missing += change
+        return change
+
+
+@dataclass
 class Link:
     """State of one bridge, kept over reconnections."""
 
     config: AdapterConfig
     radar_profile: Profile
-    framer: Framer = field(default_factory=Framer)
+    framer: PacketFramer = field(init=False)
     counters: Counter[str] = field(default_factory=Counter)
     losses: Counter[str] = field(default_factory=Counter)  # since the last verdict
     channels: dict[int, Channel429 | Channel708] = field(default_factory=dict)
-    _last: Packet | None = None
+    arrived: Counter[int] = field(default_factory=Counter)  # words by channel, used or not
+    _recent: deque[Packet] = field(default_factory=lambda: deque(maxlen=RECENT))
     _next_sequence: int | None = None
     _said: dict[int, int] = field(default_factory=dict)  # by channel, its equipment as its last label 377 said
     _lost: dict[int, int] = field(default_factory=dict)  # by channel, as the last heartbeat said
+    _sent: defaultdict[int, Sent] = field(default_factory=lambda: defaultdict(Sent))  # by channel
 
     def __post_init__(self) -> None:
+        form = form_of(self.config)
+        self.framer, self._unit = form.framer(), form.unit
         for number, channel in self.config.channels.items():
             if channel.kind == "arinc708":
                 self.channels[number] = Channel708(
@@ -96,6 +126,7 @@ class Link:
     def succeed(self, before: "Link") -> None:
         """Take over the channels and counters of a link whose pipeline failed; bytes half framed are lost with it."""
         self.channels, self.counters, self.losses = before.channels, before.counters, before.losses
+        self.arrived, self._sent, self._lost = before.arrived, before._sent, before._lost
         self.framer.succeed(before.framer)
 
     def hello(self, hello: Hello) -> None:
@@ -163,12 +194,13 @@ class Link:
     def count(self, packet: Packet) -> bool:
         """Count the packet, the flags it carries, and the packets missing before it; whether it is a new one.
 
-        The very same packet once more, as a network may deliver it, is counted and must not be used again.
+        The very same packet once more, as a network may deliver it, is counted and must not be used again. One that
+        others have overtaken is not lost after all.
         """
-        if packet == self._last:
+        if packet in self._recent:
             self.counters["packets_repeated"] += 1
             return False
-        self._last = packet
+        self._recent.append(packet)
         self.counters["packets"] += 1
         for bit, name in FLAG_NAMES.items():
             if packet.flags & bit:
@@ -180,22 +212,38 @@ class Link:
             if gap < SEQUENCE_RANGE // 2:
                 self.counters["packets_lost"] += gap
                 self.losses["packets lost"] += gap
+            elif gap >= SEQUENCE_RANGE - RECENT and packet.time_ns < self._recent[-2].time_ns:
+                self.counters["packets_late"] += 1
+                self.counters["packets_lost"] -= 1
+                return True
             else:
                 self.counters["sequence_restarts"] += 1
         self._next_sequence = (packet.sequence + 1) % SEQUENCE_RANGE
         return True
 
+    def radar(self, number: int) -> Channel708 | None:
+        """The channel if it is a radar's. Where no bridge can announce one, a radar word does it."""
+        if number not in self.channels and not self.framer.announces:
+            self.channels[number] = Channel708(self.radar_profile)
+        channel = self.channels.get(number)
+        return channel if isinstance(channel, Channel708) else None
+
     def heartbeat(self, counts: tuple[ChannelCount, ...]) -> None:
-        """Take what the bridge says it lost itself, and count what is new of it."""
+        """Take what the bridge says it lost itself and what it sent, and count what is new of it as lost."""
         lost = sum((count.lost - self._lost.get(count.channel, count.lost)) % SEQUENCE_RANGE for count in counts)
         self._lost |= {count.channel: count.lost for count in counts}
         self.counters["words_lost_in_bridge"] += lost
         self.losses["words lost in the bridge"] += lost
+        for count in counts:
+            arrived = self.arrived[count.channel]
+            change = self._sent[count.channel].say(count.received, arrived)
+            self.counters["words_lost_on_link"] += change
+            self.losses["words lost on the link"] += max(change, 0)
 
     def dropped(self, count: int) -> None:
-        """Count bytes that the gateway had no room for."""
-        self.counters["bytes_dropped"] += count
-        self.losses["bytes dropped"] += count
+        """Count bytes, frames or datagrams that the gateway or its kernel had no room for."""
+        self.counters[f"{self._unit}_dropped"] += count
+        self.losses[f"{self._unit} dropped"] += count
 
     def take_losses(self) -> list[str]:
         """What was lost since the last call, in words."""

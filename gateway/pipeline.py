@@ -17,7 +17,7 @@ from decoders.racklink import MalformedBody, Packet, heartbeat, hello, radar_wor
 from gateway.config import RackConfig, profile_of
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
 from gateway.hearing import QUIET_NS, RADAR, Hearing
-from gateway.link import SPOILT, Channel429, Channel708, Link
+from gateway.link import SPOILT, Channel429, Link
 from gateway.records import Note, Raw, Record, Status, Tick
 from gateway.timebase import Timebase
 from monitor.aircraft import Aircraft, status_name
@@ -179,6 +179,7 @@ class Pipeline:
     def _words(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         block = words429(packet)
         link.counters["words_429"] += len(block.words)
+        link.arrived[packet.channel] += len(block.words)
         in_order = bool(np.all(np.diff(block.time_ns) >= 0))
         if not (block.well_formed and in_order):
             link.counters["malformed_bodies"] += 1
@@ -219,12 +220,13 @@ class Pipeline:
     def _radar(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         word = radar_word(packet)
         link.counters["words_708"] += 1
-        channel = link.channels.get(packet.channel)
-        whole = not isinstance(channel, Channel708) or word.bit_count == channel.profile.word_bits
-        if isinstance(channel, Channel708) and not whole:
+        link.arrived[packet.channel] += 1
+        channel = link.radar(packet.channel)
+        whole = not channel or word.bit_count == channel.profile.word_bits
+        if channel and not whole:
             link.counters["words_708_" + ("short" if word.bit_count < channel.profile.word_bits else "long")] += 1
         usable = whole and (yield from self._claim(link, packet, record))
-        if not usable or not isinstance(channel, Channel708):
+        if not usable or not channel:
             link.counters["words_708_unused"] += 1
             return
         yield from self._hear(RADAR, record)

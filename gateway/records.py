@@ -20,7 +20,7 @@ class Stamp:
 
 @dataclass(frozen=True, slots=True)
 class Raw:
-    """Bytes as an adapter read them, and how many it had to drop just before."""
+    """Bytes as an adapter read them, and what was lost just before: bytes of a stream, or frames, or datagrams."""
 
     sequence: int
     stamp: Stamp

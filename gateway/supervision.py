@@ -8,13 +8,13 @@ import contextlib
 import threading
 from collections.abc import Callable
 
-from gateway.adapters import Adapter, Port
+from gateway.adapters import Adapter, Port, Reading
 from gateway.errors import GatewayError
 
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.5, 5.0
 
 Report = Callable[[str, str, str], None]  # adapter, state, reason
-Deliver = Callable[[str, bytes], None]  # adapter, chunk
+Deliver = Callable[[str, Reading], None]  # adapter, what it read
 
 
 class Supervisor:
@@ -66,10 +66,12 @@ class Supervisor:
         gave = False
         try:
             while not self._stopping.is_set():
-                chunk = port.read()
-                if chunk:
-                    self._deliver(self.name, chunk)
+                reading = port.read()
+                if reading.data or reading.lost:
+                    self._deliver(self.name, reading)
                     gave = True
+                if reading.remark:
+                    self._state("UP", reading.remark)
         except Exception as error:  # noqa: BLE001 # pyserial alone raises four unrelated kinds on unplugging
             self._lose(_reason(error))
         finally:

@@ -2,10 +2,13 @@
 
 import ast
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+
+from gateway.adapters import KINDS
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("decoders", "monitor", "gateway", "simulators")
@@ -99,16 +102,35 @@ def test_the_command_line_imports_its_work_lazily() -> None:
     }
 
 
-def test_no_adapter_writes_to_its_line() -> None:
-    calls = [
-        f"{file}:{node.lineno} {node.func.attr}"
-        for file, tree in trees("gateway/adapters")
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
+TALKING = {"send", "sendall", "sendto", "sendmsg", "sendfile", "send_periodic", "send_break", "transmit"}
+WRITING = {"write", "writelines", "bulk_write", "intr_write", "iso_write", "ctrl_transfer"}
+
+
+def calls(*packages: str) -> Iterator[tuple[str, str]]:
+    """Each method called, and where."""
+    for file, tree in trees(*packages):
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                yield f"{file}:{node.lineno}", node.func.attr
+
+
+def test_nothing_in_the_service_can_talk_on_a_bus() -> None:
+    service = [(place, name) for place, name in calls("gateway") if place.partition(":")[0] not in MAY_SIMULATE]
+    assert len(service) > 500, "the walk found hardly any calls"
+    assert [(place, name) for place, name in service if name in TALKING] == []
+    assert [(place, name) for place, name in calls("gateway/adapters") if name in WRITING] == []
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_open_line_offers_reading_and_closing_and_nothing_else(kind: str) -> None:
+    module = import_module(KINDS[kind])
+    made_here = [
+        thing for thing in vars(module).values() if isinstance(thing, type) and thing.__module__ == KINDS[kind]
     ]
-    assert calls, "the walk found no calls at all"
-    talking = {"write", "writelines", "send", "sendall", "sendto", "send_break", "ctrl_transfer", "transmit"}
-    assert [call for call in calls if call.split()[-1] in talking] == []
+    offered = {thing: {name for name in vars(thing) if not name.startswith("_")} for thing in made_here}
+    assert [offers for offers in offered.values() if "read" in offers]
+    for offers in offered.values():
+        assert offers in ({"read", "close"}, {"open"}, {"open", "name"})
 
 
 def test_the_walk_sees_what_it_must() -> None:

@@ -10,12 +10,13 @@ from urllib.parse import urlsplit
 
 import serial
 
+from gateway.adapters import NOTHING, Reading, stream
 from gateway.config import AdapterConfig
 from gateway.errors import GatewayError
 
 LONGEST_WAIT_S = 0.2  # so that a silent line still notices the order to stop
 LARGEST_READ = 65_536
-REMOTE = ("socket", "rfc2217")
+REMOTE = ("socket://", "rfc2217://")
 KEEP_ALIVE = {socket.TCP_KEEPIDLE: 5, socket.TCP_KEEPINTVL: 2, socket.TCP_KEEPCNT: 3}  # told to be dead after 11 s
 
 MENDS = {
@@ -40,13 +41,13 @@ class SerialPort:
         self._line = line
         self._telnet = telnet
 
-    def read(self) -> bytes:
+    def read(self) -> Reading:
         """Whatever has come, up to 64 KiB."""
         if self._telnet:
-            return _read_telnet(self._line)
+            return stream(_read_telnet(self._line))
         ready, _, _ = select.select([self._line], [], [], LONGEST_WAIT_S)
         try:
-            return bytes(self._line.read(LARGEST_READ)) if ready else b""
+            return stream(self._line.read(LARGEST_READ)) if ready else NOTHING
         except serial.SerialException as error:
             if "returned no data" not in str(error):  # how pyserial words a line that has gone
                 raise
@@ -68,7 +69,7 @@ class SerialAdapter:
     def open(self) -> SerialPort:
         """Open the line for this process alone. Raises GatewayError with the mend."""
         telnet = self.address.startswith("rfc2217://")
-        exclusive = None if "://" in self.address else True
+        exclusive = None if self.address.startswith(REMOTE) else True
         timeout_s = LONGEST_WAIT_S if telnet else 0
         try:
             line = serial.serial_for_url(
@@ -77,10 +78,17 @@ class SerialAdapter:
             # pyserial throws away what has come while it was opening, and with it a bridge's hello.
             line.reset_input_buffer = line._reset_input_buffer = _keep  # type: ignore[method-assign, attr-defined]
             line.open()
+            _hurry(line)
             _keep_alive(line)
         except (OSError, ValueError) as error:
             raise GatewayError(f"serial line {self.address}: {MENDS.get(_number(error), error)}") from error
         return SerialPort(line, telnet=telnet)
+
+
+def _hurry(line: serial.Serial) -> None:
+    """Have a USB adapter hand over bytes at once instead of gathering them for 16 ms; most lines know no such thing."""
+    with contextlib.suppress(OSError, ValueError, AttributeError, NotImplementedError):
+        line.set_low_latency_mode(True)
 
 
 def _keep_alive(line: Any) -> None:
@@ -117,8 +125,8 @@ def _keep() -> None:
 
 def make(address: str, config: AdapterConfig) -> SerialAdapter:
     """The adapter of a `serial:` source. Raises GatewayError for the address of a server that cannot be one."""
-    scheme, _, _ = address.partition("://")
-    if scheme in REMOTE:
+    if address.startswith(REMOTE):
+        scheme, _, _ = address.partition("://")
         try:
             parts = urlsplit(address)
             whole = bool(parts.hostname and parts.port)

@@ -249,14 +249,6 @@ def test_zeros_between_packets_are_skipped_and_nothing_else() -> None:
     assert not any(counters[name] for name in ("bad_crc", "bad_cobs", "oversize", "unknown_version"))
 
 
-@given(st.binary(max_size=5000))
-def test_a_datagram_is_one_packet_without_cobs_or_a_counted_loss(data: bytes) -> None:
-    framer = Framer()
-    assert framer.feed_datagram(packet_bytes(b"body", sequence=3)) == [GOOD]
-    assert framer.feed_datagram(data) == []
-    assert (framer.skipped, framer.pending, framer.bad_crc + framer.oversize) == (len(data), 0, 1)
-
-
 def test_words_come_with_their_device_times() -> None:
     body = struct.pack("<4I", 0, 0x11223344, 2**32 - 1, 0xFFFFFFFF)
     timed = words429(made(0x10, body, 2**40))

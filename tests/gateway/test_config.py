@@ -142,8 +142,8 @@ def test_profiles_and_definitions_of_ones_own_count_from_the_rack_file_and_are_k
 @pytest.mark.parametrize(
     ("profile", "labels", "where"),
     [
-        (OWN_PROFILE + "bins = 1", OWN_SET, r"channels\.0\.profile: .*radar\.toml \[my_radar\] bins: .*32"),
-        (OWN_PROFILE + "bins = 1", OWN_SET, r"radar_profile: .*radar\.toml \[my_radar\] bins: .*32"),
+        (OWN_PROFILE + "bins = 1", OWN_SET, r"channels\.0\.profile: .*radar\.toml \[my_radar\] bins: .*64"),
+        (OWN_PROFILE + "bins = 1", OWN_SET, r"radar_profile: .*radar\.toml \[my_radar\] bins: .*64"),
         ("[", OWN_SET, r"radar\.toml is no TOML"),
         (OWN_PROFILE, "[", r"channels\.1\.definitions: .*labels\.toml is no TOML"),
         (OWN_PROFILE, OWN_SET.replace("310", "999"), r"labels\.toml:[0-9]+ \[my_box\] label 999"),

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from gateway import journal as journal_module
+from gateway.adapters import stream
 from gateway.journal import Journal
 from gateway.queues import OVERHEAD_BYTES
 from gateway.recording import Recorder
@@ -67,7 +68,7 @@ def test_records_are_written_before_they_are_passed_on() -> None:
     log = Log()
     with running(journal := make(log)):
         for k in range(200):
-            journal.chunk("bridge", bytes([k]))
+            journal.chunk("bridge", stream(bytes([k])))
     assert log.calls.pop() == ("close", [])
     names = [name for name, _ in log.calls]
     assert names == ["append", "deliver"] * (len(names) // 2)
@@ -79,8 +80,8 @@ def test_records_are_numbered_in_order_whatever_their_kind() -> None:
     log = Log()
     with running(journal := make(log)):
         journal.report("bridge", "UP", "why")
-        journal.chunk("bridge", b"a")
-        journal.chunk("other", b"b")
+        journal.chunk("bridge", stream(b"a"))
+        journal.chunk("other", stream(b"b"))
         journal.report("bridge", "LOST")
     assert [record.sequence for record in log.delivered()] == [0, 1, 2, 3]
     assert [type(record) for record in log.delivered()] == [Status, Raw, Raw, Status]
@@ -89,14 +90,14 @@ def test_records_are_numbered_in_order_whatever_their_kind() -> None:
 def test_a_full_queue_drops_the_newest_bytes_and_the_next_chunk_of_that_adapter_says_how_many() -> None:
     log = Log()
     journal = make(log, limit_bytes=10 + 2 * OVERHEAD_BYTES)
-    journal.chunk("bridge", b"12345678")
-    journal.chunk("bridge", b"lost")
-    journal.chunk("bridge", b"gone")
-    journal.chunk("other", b"9")
+    journal.chunk("bridge", stream(b"12345678"))
+    journal.chunk("bridge", stream(b"lost"))
+    journal.chunk("bridge", stream(b"gone"))
+    journal.chunk("other", stream(b"9"))
     with running(journal):
         wait_until(lambda: len(log.delivered()) == 2, "the queue is empty")
-        journal.chunk("bridge", b"later")
-        journal.chunk("bridge", b"last")
+        journal.chunk("bridge", stream(b"later"))
+        journal.chunk("bridge", stream(b"last"))
     found = [(r.adapter, r.data, r.dropped_before) for r in log.delivered() if isinstance(r, Raw)]
     assert found == [("bridge", b"12345678", 0), ("other", b"9", 0), ("bridge", b"later", 8), ("bridge", b"last", 0)]
 
@@ -135,7 +136,7 @@ def test_the_disk_is_asked_to_hold_the_data_at_the_stated_interval() -> None:
     log = Log()
     with running(journal := make(log, sync_interval_s=1e-9)):
         for k in range(3):
-            journal.chunk("bridge", bytes([k]))
+            journal.chunk("bridge", stream(bytes([k])))
             log.wait_for(k)
     names = [name for name, _ in log.calls]
     assert names == ["append", "sync", "deliver"] * (len(names) // 3) + ["close"]
@@ -169,7 +170,7 @@ def test_a_failing_disk_stops_the_recording_and_says_so_while_records_flow_on(fa
     log = Failing(failure)
     with running(journal := make(log, sync_interval_s=1e-9 if failure == "sync" else 60)):
         for k in range(20):
-            journal.chunk("bridge", bytes([k]))
+            journal.chunk("bridge", stream(bytes([k])))
             log.wait_for(k)
     assert b"".join(record.data for record in log.delivered() if isinstance(record, Raw)) == bytes(range(20))
     failed = [record for record in log.delivered() if isinstance(record, Status)]
@@ -184,7 +185,7 @@ def test_a_failing_disk_stops_the_recording_and_says_so_while_records_flow_on(fa
 def test_a_disk_that_has_no_room_for_the_index_is_told() -> None:
     log = Failing("close")
     with running(journal := make(log)):
-        journal.chunk("bridge", b"x")
+        journal.chunk("bridge", stream(b"x"))
     assert "No space left on device; make room" in journal.recording_error
     assert [name for name, _ in log.calls] == ["append", "deliver", "close", "abandon"]
 
@@ -193,7 +194,7 @@ def test_sequences_stay_unique_across_a_failing_disk() -> None:
     log = Failing("append")
     with running(journal := make(log)):
         for k in range(10):
-            journal.chunk("bridge", bytes([k]))
+            journal.chunk("bridge", stream(bytes([k])))
             log.wait_for(k)
     sequences = [record.sequence for record in log.delivered()]
     assert sequences == list(range(len(sequences)))
@@ -213,7 +214,7 @@ def test_a_real_recorder_holds_what_was_passed_on_at_that_moment(tmp_path: Path)
     journal = Journal(recorder, deliver, 1 << 20)
     with running(journal):
         for k in range(50):
-            journal.chunk("bridge", bytes(k))
+            journal.chunk("bridge", stream(bytes(k)))
     assert agreed and all(agreed)
 
 
@@ -221,5 +222,5 @@ def test_without_a_recorder_records_flow_all_the_same() -> None:
     passed: list[Record] = []
     keep: Callable[[list[Record]], None] = passed.extend
     with running(journal := Journal(None, keep, 1 << 20)):
-        journal.chunk("bridge", b"x")
+        journal.chunk("bridge", stream(b"x"))
     assert [type(record) for record in passed] == [Raw]

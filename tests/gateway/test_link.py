@@ -71,6 +71,66 @@ def test_words_lost_in_the_bridge_are_the_growth_of_what_its_heartbeats_say() ->
     assert link.counters["words_lost_in_bridge"] == (2**32 - 1 - 5) + 1
 
 
+@pytest.mark.parametrize(
+    ("said", "arrived", "lost"),
+    [
+        ((0, 10, 20), (0, 10, 20), (0, 0, 0)),
+        ((0, 10, 20), (0, 7, 17), (0, 3, 3)),
+        ((500, 510, 530), (20, 30, 45), (0, 0, 5)),  # listening began in the middle
+        ((2**32 - 5, 5, 15), (0, 10, 19), (0, 0, 1)),  # the count wraps
+        ((100, 0, 10), (100, 103, 113), (0, 0, 0)),  # the bridge began anew
+        ((0, 10, 20), (0, 12, 20), (0, 0, 0)),  # a heartbeat that came a little late
+        ((0, 10, 74, 30), (0, 10, 20, 30), (0, 0, 54, 0)),  # one altered on its way
+        ((40, 50, 12, 70), (0, 10, 20, 28), (0, 0, 0, 2)),  # and one that looks like a new beginning
+    ],
+)
+def test_what_a_bridge_says_that_it_sent_and_did_not_arrive_is_lost_on_the_link(
+    said: tuple[int, ...], arrived: tuple[int, ...], lost: tuple[int, ...]
+) -> None:
+    link = make()
+    for received, words, missing in zip(said, arrived, lost, strict=True):
+        link.arrived[1] = words
+        link.heartbeat((ChannelCount(1, received, 0),))
+        assert link.counters["words_lost_on_link"] == missing
+    told = [f"degraded: bridge: {max(lost)} words lost on the link"] if max(lost) else []
+    assert link.take_losses() == told
+
+
+def test_a_packet_that_others_have_overtaken_is_not_lost() -> None:
+    link = make()
+    packets = [Packet(f.HEARTBEAT, 0, 0, k, 1000 * k, b"") for k in (0, 1, 3, 4, 2, 5)]
+    assert all(link.count(packet) for packet in packets)
+    assert (link.counters["packets_late"], link.counters["packets_lost"], link.counters["sequence_restarts"]) == (
+        1,
+        0,
+        0,
+    )
+
+
+def test_a_network_may_repeat_a_packet_after_others() -> None:
+    link = make()
+    packets = [Packet(f.HEARTBEAT, 0, 0, k, 1000 * k, b"") for k in (0, 1, 2, 1, 0, 3)]
+    assert [link.count(packet) for packet in packets] == [True, True, True, False, False, True]
+    assert (link.counters["packets_repeated"], link.counters["packets_lost"]) == (2, 0)
+
+
+@pytest.mark.parametrize(
+    ("source", "unit"),
+    [("serial:x", "bytes"), ("usb:1:2", "bytes"), ("udp:1", "datagrams"), ("can:socketcan:can0", "frames")],
+)
+def test_what_is_dropped_is_counted_in_the_units_of_its_line(source: str, unit: str) -> None:
+    link = Link(AdapterConfig(name="bridge", source=source), load_profile("arinc708"))
+    link.dropped(7)
+    assert link.take_losses() == [f"degraded: bridge: 7 {unit} dropped"]
+    assert link.all_counters()[f"{unit}_dropped"] == 7
+
+
+@pytest.mark.parametrize(("source", "named"), [("can:slcan:x", True), ("udp:127.0.0.1:1", False)])
+def test_a_radar_word_names_its_channel_where_no_bridge_can_say_hello(source: str, named: bool) -> None:
+    link = Link(AdapterConfig(name="bridge", source=source), load_profile("arinc708"))
+    assert link.radar(4) == (Channel708(load_profile("arinc708")) if named else None)
+
+
 @pytest.mark.parametrize("kind", [f.KIND_429_LOW, f.KIND_429_HIGH])
 @pytest.mark.parametrize(("orientation", "name"), list(enumerate(f.ORIENTATIONS)))
 def test_a_hello_tells_equipment_and_orientation(kind: int, orientation: int, name: str) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.adapters import Port, make_adapter
+from gateway.adapters import NOTHING, Port, make_adapter
 from gateway.config import AdapterConfig
 from gateway.errors import GatewayError
 from simulators.outlets import PtyOutlet
@@ -28,7 +28,7 @@ def read_until(port: Port, size: int) -> bytes:
     received = bytearray()
 
     def enough() -> bool:
-        received.extend(port.read())
+        received.extend(port.read().data)
         return len(received) >= size
 
     wait_until(enough, f"{size} bytes")
@@ -40,7 +40,7 @@ def read_to_the_end(port: Port) -> bytes:
 
     def ended() -> bool:
         try:
-            received.extend(port.read())
+            received.extend(port.read().data)
         except OSError:
             return True
         return False
@@ -80,7 +80,7 @@ def test_bytes_that_came_before_the_line_was_opened_are_kept() -> None:
 def test_a_silent_line_gives_nothing_after_a_short_wait() -> None:
     with PtyOutlet() as outlet:
         port = open_port(outlet.path)
-        assert port.read() == b""
+        assert port.read() == NOTHING
         port.close()
 
 
@@ -128,7 +128,7 @@ def test_a_line_whose_device_has_gone_is_said_to_be_unplugged(monkeypatch: pytes
 def test_a_silent_socket_gives_nothing_after_a_short_wait(server: socket.socket) -> None:
     port = open_port(address_of(server))
     client, _ = server.accept()
-    assert port.read() == b""
+    assert port.read() == NOTHING
     client.sendall(b"words")
     assert read_until(port, 5) == b"words"
     client.close()

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway import supervision
-from gateway.adapters import make_adapter
+from gateway.adapters import Reading, make_adapter, stream
 from gateway.config import AdapterConfig
 from gateway.supervision import Supervisor
 from simulators.outlets import PtyOutlet
@@ -46,12 +46,11 @@ class Fake:
         self._act("open")
         return self
 
-    def read(self) -> bytes:
-        return self._act("read") or self._nothing()
-
-    def _nothing(self) -> bytes:
-        threading.Event().wait(0.001)
-        return b""
+    def read(self) -> Reading:
+        data = self._act("read")
+        if not data:
+            threading.Event().wait(0.001)
+        return stream(data)
 
     def close(self) -> None:
         self._act("close")
@@ -77,9 +76,9 @@ class Seen:
         assert adapter == "bridge"
         self.states.append((state, reason))
 
-    def deliver(self, adapter: str, chunk: bytes) -> None:
+    def deliver(self, adapter: str, reading: Reading) -> None:
         assert adapter == "bridge"
-        self.data += chunk
+        self.data += reading.data
 
 
 def supervise(fake: Fake, until: Callable[[Seen], bool]) -> Seen:

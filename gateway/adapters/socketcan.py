@@ -1,0 +1,78 @@
+"""The kernel's CAN interfaces, by a socket of our own: python-can does not read how many frames the kernel dropped."""
+
+import contextlib
+import errno
+import os
+import socket
+import struct
+import time
+
+from decoders import formats as f
+from gateway.adapters import NOTHING, Reading
+from gateway.adapters.sockets import RECEIVE_BYTES, Overflows, prepare, wait
+from gateway.errors import GatewayError
+
+HEAD = struct.Struct(f.CAN_RECORD)
+FRAME = struct.Struct("=IBBxx")  # identifier with flags, length, FD flags: the head of can_frame and canfd_frame
+LARGEST_FRAME = 72
+FD_FRAME = 0x04  # flag of a frame that has FD's form
+MOST_AT_ONCE = 512
+
+MENDS = {
+    errno.ENODEV: "no such interface: see `ip link show type can`",
+    errno.ENETDOWN: "the interface is down: sudo ip link set {} up type can bitrate 1000000",
+}
+
+
+class SocketCanPort:
+    """An open raw socket, for classic and FD frames alike."""
+
+    def __init__(self, line: socket.socket) -> None:
+        self._line = line
+        self._overflows = Overflows()
+
+    def read(self) -> Reading:
+        """The frames that have come, up to 512. Raises OSError once the interface is down or gone."""
+        if not wait(self._line):
+            return NOTHING
+        chunk, count, lost = bytearray(), 0, 0
+        with contextlib.suppress(BlockingIOError):
+            while count < MOST_AT_ONCE:
+                frame, beside, _, _ = self._line.recvmsg(LARGEST_FRAME, Overflows.SPACE)
+                lost += self._overflows.since(beside)
+                identifier, length, flags = FRAME.unpack_from(frame)
+                flags |= FD_FRAME * (len(frame) == LARGEST_FRAME)
+                chunk += HEAD.pack(time.monotonic_ns(), identifier, flags, length)
+                chunk += frame[FRAME.size : FRAME.size + length]
+                count += 1
+        return Reading(bytes(chunk), count, lost)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._line.close()
+
+
+class SocketCanAdapter:
+    """An interface by its name, such as can0."""
+
+    def __init__(self, interface: str) -> None:
+        self.interface = interface
+
+    def open(self) -> SocketCanPort:
+        """Bind to the interface. Raises GatewayError with the mend."""
+        try:
+            line = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        except OSError as error:
+            raise GatewayError(f"can {self.interface}: this kernel has no CAN: sudo modprobe can_raw") from error
+        try:
+            prepare(line, RECEIVE_BYTES)
+            line.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
+            line.bind((self.interface,))
+            trouble = line.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)  # how a raw socket says that it is down
+        except OSError as error:
+            trouble = error.errno or errno.EIO
+        if trouble:
+            line.close()
+            mend = MENDS.get(trouble, os.strerror(trouble)).format(self.interface)
+            raise GatewayError(f"can {self.interface}: {mend}")
+        return SocketCanPort(line)
