@@ -16,8 +16,9 @@ from gateway.records import Raw, Stamp
 from monitor.calibration import Calibration
 from monitor.integrity import ALERT, Comparison, Verdict
 from monitor.scans import Scan
+from simulators.carriers import stream
+from simulators.link import units
 from simulators.scenario import Scenario
-from simulators.traffic import traffic
 
 BATCH = 64
 ENOUGH_PAIRS = 20
@@ -57,7 +58,7 @@ def fly(flight: Flight) -> list[Judged]:
         judged.append(Judged(verdict, comparison.disparities if comparison else np.empty(0)))
 
     pipeline = Pipeline(config, build_monitor(config, flight.calibration), watch)
-    for number, (time_ns, data) in enumerate(traffic(flight.scenario)):
+    for number, (time_ns, data) in enumerate(units(flight.scenario, stream())):
         for _ in pipeline.feed(Raw(number, Stamp(time_ns, time_ns), "bridge", data)):
             pass
     for _ in pipeline.finish():

@@ -12,10 +12,11 @@ import time
 from collections.abc import Iterator
 from threading import Thread
 
+from simulators.carriers import stream
+from simulators.link import units
 from simulators.outlets import PtyOutlet
 from simulators.player import play
 from simulators.scenario import white_mountains
-from simulators.traffic import traffic
 
 SWEEP_NS = 361 * 12_500_000  # 361 radials, 80 a second
 SWEEPS = 4
@@ -36,7 +37,7 @@ def main() -> None:
             reader.start()
             while "open" not in seen:
                 time.sleep(0.01)
-            play(_timed(traffic(scenario), written), line)
+            play(_timed(units(scenario, stream()), written), line)
             line.close()
             gateway.send_signal(signal.SIGTERM)
             reader.join()

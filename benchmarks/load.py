@@ -18,8 +18,8 @@ from gateway.pipeline import Pipeline
 from gateway.records import Raw, Stamp
 from monitor.aircraft import AXES, SOURCES
 from simulators import arinc429, racklink
+from simulators.link import whole_stream
 from simulators.scenario import BUILT_IN_TERRAIN, Radar, Scenario, white_mountains
-from simulators.traffic import traffic
 
 SECONDS = 30
 PIECE_NS = 10_000_000
@@ -76,9 +76,7 @@ def _scenario() -> Scenario:
 
 
 def _flown() -> Iterator[Packet]:
-    framer = Framer()
-    for _, data in traffic(_scenario()):
-        yield from framer.feed(data)
+    yield from Framer().feed(whole_stream(_scenario()))
 
 
 def _filler(channel: int, count: int) -> Iterator[Packet]:

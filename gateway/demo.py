@@ -152,10 +152,11 @@ def shift_terrain(terrain: Path, target: Path, *, east_m: float = 0.0, north_m: 
 
 
 def _live(leg: Leg, out: Path, seed: int, speed: float, console: Console, stop: Stop) -> None:
+    from simulators.carriers import stream
+    from simulators.link import units
     from simulators.outlets import PtyOutlet
     from simulators.player import play
     from simulators.scenario import Fault, white_mountains
-    from simulators.traffic import traffic
 
     scenario = white_mountains(LEG_S, seed).model_copy(update={"faults": tuple(Fault(**f) for f in leg.faults)})
     console.rule(leg.title)
@@ -166,7 +167,7 @@ def _live(leg: Leg, out: Path, seed: int, speed: float, console: Console, stop: 
         with Progress(console=console) as bar, _gateway(leg, config, longest_s, console) as gateway:
             task = bar.add_task(leg.title, total=math.ceil(LEG_S))
             _wait_until_it_listens(leg, gateway, stop)
-            play(stop.until(_shown(traffic(scenario), leg, bar, task)), line, speed)
+            play(stop.until(_shown(units(scenario, stream()), leg, bar, task)), line, speed)
             line.drain()
             gateway.send_signal(signal.SIGTERM)
             code = gateway.wait(STOP_S)

@@ -32,8 +32,11 @@ BATCH_NS = 10_000_000
 
 
 @dataclass(frozen=True, order=True)
-class Packet:
-    """A packet before it is numbered: ready at `ready_ns`, its first word begun at `time_ns`, by the device clock."""
+class Due:
+    """What the bridge is to send at `ready_ns`; its first word has begun at `time_ns` by the device clock.
+
+    `lost` is what the bridge gathers and then loses before it can number it.
+    """
 
     ready_ns: int
     channel: int
@@ -41,6 +44,8 @@ class Packet:
     time_ns: int
     body: bytes
     words: int = 0
+    flags: int = 0
+    lost: bool = False
 
 
 @dataclass
@@ -74,7 +79,7 @@ class Line429:
         self._bus = Bus(WORD_429_BIT_TIMES * bit_ns)
         self._last_bit_ns = WORD_429_BITS * bit_ns
 
-    def until(self, end_ns: int) -> Iterator[Packet]:
+    def until(self, end_ns: int) -> Iterator[Due]:
         """Packets of the words begun before `end_ns`, a multiple of 10 ms: one for every 10 ms that saw words."""
         due, words = self._due(self.done_ns, end_ns)
         self.done_ns = end_ns
@@ -85,7 +90,7 @@ class Line429:
                 batches.setdefault(start // BATCH_NS, []).append((start, word))
         self._waiting = [pair for pair in self._waiting if pair[0] >= end_ns]
         for batch in batches.values():
-            yield self._packet(batch)
+            yield self._gathered(batch)
 
     def _due(self, start_ns: int, end_ns: int) -> tuple[Nanoseconds, Words]:
         """Due times and words (n,) of [start, end) in the order in which they queue."""
@@ -99,11 +104,11 @@ class Line429:
         order = np.argsort(joined, kind="stable")
         return joined[order], sent[order]
 
-    def _packet(self, batch: Sequence[tuple[int, int]]) -> Packet:
+    def _gathered(self, batch: Sequence[tuple[int, int]]) -> Due:
         first, last = batch[0][0], batch[-1][0]
         body = racklink.words_429([start - first for start, _ in batch], [word for _, word in batch])
         ready = last + self._last_bit_ns
-        return Packet(ready, self.channel.number, WORDS_429, first, body, len(batch))
+        return Due(ready, self.channel.number, WORDS_429, first, body, len(batch))
 
 
 @dataclass
@@ -115,8 +120,8 @@ class Line708:
     def __post_init__(self) -> None:
         self._bus = Bus(WORD_708_NS)
 
-    def packets(self, due_ns: Nanoseconds, words: NDArray[np.uint8]) -> Iterator[Packet]:
+    def words(self, due_ns: Nanoseconds, words: NDArray[np.uint8]) -> Iterator[Due]:
         """Packets of words (n, 200) due at rising times (n,)."""
         for start, word in zip(self._bus.starts(due_ns).tolist(), words, strict=True):
             body = racklink.word_708(word.tobytes())
-            yield Packet(start + WORD_708_NS, self.channel, WORD_708, start, body, 1)
+            yield Due(start + WORD_708_NS, self.channel, WORD_708, start, body, 1)

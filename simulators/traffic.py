@@ -1,24 +1,24 @@
-"""A scenario as the byte stream of one bridge: hello, heartbeats, ARINC 429 and 708 words in the order they end."""
+"""A scenario as the packets of one bridge: hello, heartbeats, ARINC 429 and 708 words in the order they end."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from decoders.formats import HEARTBEAT, HELLO, KIND_708
-from simulators import racklink
+from decoders.formats import KIND_708
+from simulators import bridge
+from simulators.bridge import Bridge
 from simulators.flight import Trajectory, Truth
-from simulators.instruments import channels
+from simulators.instruments import Channel, channels
+from simulators.ledger import Ledger
+from simulators.racklink import Packet
 from simulators.radar import METRES_PER_NM, Radar
 from simulators.scenario import Scenario
-from simulators.schedule import Line429, Line708, Packet
+from simulators.schedule import Due, Line429, Line708
 from simulators.terrain import Ground, build
 
 RADAR_CHANNEL = 0
-SERIAL_NUMBER, FIRMWARE = 1, 0x0100
 BLOCK_NS = 100_000_000  # a multiple of the bridge's batch; a live reader waits for one to be made
-HEARTBEAT_NS = 1_000_000_000
-HELLO_NS = 10_000_000_000
 TRACK_STEP_S = 2.0
 REACH_MARGIN_M = 250.0
 
@@ -56,59 +56,32 @@ def _refuse_crash(track: Truth, ground: Ground) -> None:
         )
 
 
-def traffic(scenario: Scenario) -> Iterator[tuple[int, bytes]]:
-    """Encoded packets, each with the device time in ns at which it is complete, in that order, made on demand.
+def traffic(scenario: Scenario, ledger: Ledger | None = None) -> Iterator[tuple[int, Packet]]:
+    """Packets, each with the ns at which it is ready, in that order, made on demand; the last is a heartbeat.
 
-    The same scenario gives the same bytes. Raises as `prepare` does, when the first packet is asked for.
+    The same scenario gives the same packets. The books are kept in `ledger`. Raises as `prepare` does, when the first
+    packet is asked for.
     """
     simulation = prepare(scenario)
     buses = channels(scenario, simulation.trajectory, simulation.ground)
-    lines, radar_line = [Line429(channel) for channel in buses], Line708(RADAR_CHANNEL)
     kinds = {RADAR_CHANNEL: (KIND_708, 0)} | {bus.number: (bus.kind, bus.equipment) for bus in buses}
-    bridge = Bridge(kinds)
-    total_ns = round(scenario.flight.total_s * 1e9)
-    waiting: list[Packet] = []
+    yield from Bridge(kinds, ledger or Ledger()).packets(_dues(simulation, buses))
+
+
+def _dues(simulation: Simulation, buses: Sequence[Channel]) -> Iterator[Due]:
+    """All that the bridge has to send, in order."""
+    lines, radar_line = [Line429(channel) for channel in buses], Line708(RADAR_CHANNEL)
+    total_ns = round(simulation.scenario.flight.total_s * 1e9)
+    waiting: list[Due] = []
     for start in range(0, total_ns, BLOCK_NS):
         end = start + BLOCK_NS
         waiting += bridge.routine(start, end)
         for line in lines:
             waiting += line.until(end)
         radials = simulation.radar.between(start / 1e9, end / 1e9)
-        due = np.rint(radials.time_s * 1e9).astype(np.int64)
-        waiting += radar_line.packets(due, simulation.radar.words(radials))
+        begins = np.rint(radials.time_s * 1e9).astype(np.int64)
+        waiting += radar_line.words(begins, simulation.radar.words(radials))
         limit = min(end, total_ns)
-        for packet in sorted(packet for packet in waiting if packet.ready_ns < limit):
-            yield packet.ready_ns, bridge.encode(packet)
-        waiting = [packet for packet in waiting if packet.ready_ns >= limit]
-
-
-class Bridge:
-    """The device between buses and host: it numbers packets and counts the words that it passes on."""
-
-    def __init__(self, kinds: dict[int, tuple[int, int]]) -> None:
-        """`kinds` gives each channel's kind and equipment identity."""
-        self._kinds = kinds
-        self._received = dict.fromkeys(kinds, 0)
-        self._sequence = 0
-
-    def routine(self, start_ns: int, end_ns: int) -> Iterator[Packet]:
-        """The hellos and heartbeats of [start, end); a heartbeat's counts are filled in when it is sent."""
-        for interval, kind in ((HELLO_NS, HELLO), (HEARTBEAT_NS, HEARTBEAT)):
-            for time in range(-(-start_ns // interval) * interval, end_ns, interval):
-                yield Packet(time, RADAR_CHANNEL, kind, time, b"")
-
-    def encode(self, packet: Packet) -> bytes:
-        """The packet's bytes, with the next number of the sequence."""
-        body = self._body(packet)
-        self._received[packet.channel] += packet.words
-        encoded = racklink.encode(packet.type, packet.channel, self._sequence, packet.time_ns, body)
-        self._sequence += 1
-        return encoded
-
-    def _body(self, packet: Packet) -> bytes:
-        if packet.type == HELLO:
-            listed = ((number, kind, 0, equipment) for number, (kind, equipment) in self._kinds.items())
-            return racklink.hello(SERIAL_NUMBER, FIRMWARE, listed)
-        if packet.type == HEARTBEAT:
-            return racklink.heartbeat((number, count, 0) for number, count in self._received.items())
-        return packet.body
+        yield from sorted(due for due in waiting if due.ready_ns < limit)
+        waiting = [due for due in waiting if due.ready_ns >= limit]
+    yield bridge.heartbeat(total_ns)  # tells of losses since the one before

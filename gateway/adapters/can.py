@@ -5,6 +5,7 @@ the interface can be opened with `?listen_only=true`, if it knows that.
 """
 
 import contextlib
+import logging
 import re
 import socket
 import struct
@@ -21,6 +22,10 @@ from gateway.adapters.socketcan import SocketCanAdapter
 from gateway.adapters.sockets import LONGEST_WAIT_S, wait
 from gateway.config import AdapterConfig
 from gateway.errors import GatewayError
+
+# What a driver has to say of a failure is in its exceptions; its log would repeat it on the console for ever.
+logging.getLogger("can").addHandler(logging.NullHandler())
+logging.getLogger("can").propagate = False
 
 HEAD = struct.Struct(f.CAN_RECORD)
 MOST_AT_ONCE = 512
@@ -108,7 +113,7 @@ class CanAdapter:
         """Open the bus. Raises GatewayError with what the driver says."""
         place = f"can {self.interface}:{self.channel}"
         try:
-            bus = can.Bus(interface=self.interface, channel=self.channel, **self.options)
+            bus = can.Bus(interface=self.interface, channel=self.channel, ignore_config=True, **self.options)
         except Exception as error:  # each driver has kinds of its own
             raise GatewayError(f"{place}: {error or type(error).__name__}") from error
         if self.interface == "slcan":

@@ -16,7 +16,7 @@ from gateway.errors import GatewayError
 
 LONGEST_WAIT_S = 0.2  # so that a silent line still notices the order to stop
 LARGEST_READ = 65_536
-REMOTE = ("socket", "rfc2217")
+REMOTE = ("socket://", "rfc2217://")
 KEEP_ALIVE = {socket.TCP_KEEPIDLE: 5, socket.TCP_KEEPINTVL: 2, socket.TCP_KEEPCNT: 3}  # told to be dead after 11 s
 
 MENDS = {
@@ -69,7 +69,7 @@ class SerialAdapter:
     def open(self) -> SerialPort:
         """Open the line for this process alone. Raises GatewayError with the mend."""
         telnet = self.address.startswith("rfc2217://")
-        exclusive = None if "://" in self.address else True
+        exclusive = None if self.address.startswith(REMOTE) else True
         timeout_s = LONGEST_WAIT_S if telnet else 0
         try:
             line = serial.serial_for_url(
@@ -125,8 +125,8 @@ def _keep() -> None:
 
 def make(address: str, config: AdapterConfig) -> SerialAdapter:
     """The adapter of a `serial:` source. Raises GatewayError for the address of a server that cannot be one."""
-    scheme, _, _ = address.partition("://")
-    if scheme in REMOTE:
+    if address.startswith(REMOTE):
+        scheme, _, _ = address.partition("://")
         try:
             parts = urlsplit(address)
             whole = bool(parts.hostname and parts.port)

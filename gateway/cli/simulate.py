@@ -6,10 +6,16 @@ from typing import Annotated
 
 import typer
 
+PLACES = "pty, tcp:PORT (0 takes a free one), file:PATH, udp:HOST:PORT, slcan or can:INTERFACE:CHANNEL"
+UNITS = {"stream": "packets", "datagram": "datagrams", "can": "frames", "slcan": "lines"}
+
 
 def simulate(
     scenario: Annotated[Path | None, typer.Argument(help="scenario (TOML); the White Mountains flight if left")] = None,
-    to: Annotated[str, typer.Option(help="pty, tcp:PORT (0 takes a free one) or file:PATH")] = "pty",
+    to: Annotated[
+        str,
+        typer.Option(help=PLACES),
+    ] = "pty",
     speed: Annotated[float, typer.Option(min=0.01, help="times real time; a file is written at once")] = 1.0,
     seed: Annotated[int | None, typer.Option(min=0, help="instead of the scenario's")] = None,
     duration: Annotated[float | None, typer.Option(min=1, help="seconds of the first leg, instead of its own")] = None,
@@ -22,10 +28,11 @@ def simulate(
 
     stop = Stop()  # before the imports that take their time
     from gateway.errors import GatewayError
-    from simulators import outlets
+    from simulators.link import units
+    from simulators.outlets import FileOutlet
+    from simulators.outlets.named import named
     from simulators.player import play
     from simulators.scenario import load, white_mountains
-    from simulators.traffic import traffic
 
     try:
         plan = load(scenario) if scenario else white_mountains()
@@ -37,20 +44,20 @@ def simulate(
         plan = plan.model_copy(update={"seed": seed})
 
     try:
-        outlet = outlets.named(to)
+        outlet, carrier = named(to)
     except (OSError, ValueError) as error:
         told = f"{error.strerror}: choose another" if isinstance(error, OSError) else error
         raise GatewayError(f"--to {to}: {told}") from error
     if outlet.place:
         typer.echo(outlet.place)
-    if isinstance(outlet, outlets.FileOutlet):
+    if isinstance(outlet, FileOutlet):
         speed = float("inf")
-    if isinstance(outlet, outlets.PtyOutlet):
+    if hasattr(outlet, "on_stall"):
         outlet.on_stall = lambda: typer.echo(f"{outlet.place} is full: waiting for a reader", err=True)
     threading.Thread(target=lambda: stop.wait() and outlet.close(), daemon=True).start()  # also while it waits
     try:
         with outlet:
-            played = play(traffic(plan), outlet, speed, stop)
+            played = play(units(plan, carrier), outlet, speed, stop)
     except OSError as error:  # from the system, or in words from what reads the terrain
         place = error.filename or f"--to {to}"
         told = f"{place}: {error.strerror}: choose another" if error.strerror else f"simulation: {error}"
@@ -59,7 +66,5 @@ def simulate(
         raise GatewayError(f"simulation: {error}") from error
     if stop.is_set():
         return
-    typer.echo(
-        f"{played.packets} packets, {played.size_bytes} bytes, at worst {played.worst_lateness_s * 1e3:.1f} ms late",
-        err=True,
-    )
+    sent = f"{played.units} {UNITS[carrier.name]}, {played.size_bytes} bytes"
+    typer.echo(f"{sent}, at worst {played.worst_lateness_s * 1e3:.1f} ms late", err=True)

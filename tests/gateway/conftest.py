@@ -7,8 +7,9 @@ import pytest
 from hypothesis import settings
 
 from gateway.config import RackConfig, check_config
+from simulators.carriers import stream as stream_carrier
+from simulators.link import units
 from simulators.scenario import BUILT_IN_TERRAIN, Scenario, white_mountains
-from simulators.traffic import traffic
 
 # The first example of a run may compile a kernel, so a time limit on an example would measure the compiler.
 settings.register_profile("compiled", deadline=None)
@@ -28,7 +29,7 @@ def scenario() -> Scenario:
 @pytest.fixture(scope="session")
 def flight(scenario: Scenario) -> list[tuple[int, bytes]]:
     """The encoded packets of the flight, each with its device time."""
-    return list(traffic(scenario))
+    return list(units(scenario, stream_carrier()))
 
 
 @pytest.fixture(scope="session")

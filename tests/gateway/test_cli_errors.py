@@ -136,7 +136,10 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
         ("--to file:/dev/full: No space left on device: choose another",),
     ),
     "demo without a place": (lambda d: ["demo", "--out", "/proc/no"], ("cannot write to /proc/no", "with --out")),
-    "unknown outlet": (lambda d: ["simulate", "--to", "tin"], ("--to tin: use pty, tcp:PORT or file:PATH",)),
+    "unknown outlet": (
+        lambda d: ["simulate", "--to", "tin"],
+        ("--to tin: use pty, tcp:PORT, file:PATH, udp:",),
+    ),
 }
 
 

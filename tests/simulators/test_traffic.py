@@ -10,6 +10,8 @@ import pytest
 
 from simulators import scenario, traffic
 from simulators.arinc429 import encode
+from simulators.carriers import stream
+from simulators.link import units
 from simulators.schedule import Bus
 from tests.simulators.packets import Parsed, label_of, parse
 
@@ -25,7 +27,7 @@ INTERVALS_NS = {  # channel: {label: interval}
 
 @pytest.fixture(scope="module")
 def packets() -> list[Parsed]:
-    return [parse(*pair) for pair in traffic.traffic(SHORT)]
+    return [parse(*pair) for pair in units(SHORT, stream())]
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +59,7 @@ def test_another_seed_gives_other_bytes_of_the_same_shape() -> None:
 def test_packets_come_in_the_order_in_which_they_end_and_are_numbered_without_a_gap(packets: list[Parsed]) -> None:
     assert all(before.ready_ns <= after.ready_ns for before, after in pairwise(packets))
     assert [packet.sequence for packet in packets] == list(range(len(packets)))
-    assert packets[-1].ready_ns < DURATION_S * 1e9
+    assert packets[-2].ready_ns < DURATION_S * 1e9
 
 
 def test_a_packet_is_ready_when_the_last_bit_of_its_last_word_has_left_the_bus(packets: list[Parsed]) -> None:
@@ -119,12 +121,16 @@ def test_each_heartbeat_counts_the_words_sent_before_it(packets: list[Parsed]) -
             assert list(struct.iter_unpack("<BII", packet.body)) == [
                 (channel, sent[channel], 0) for channel in range(4)
             ]
-    assert beats == DURATION_S
+    assert beats == DURATION_S + 1
+
+
+def test_the_last_packet_is_a_heartbeat_so_that_losses_at_the_end_count(packets: list[Parsed]) -> None:
+    assert (packets[-1].type, packets[-1].ready_ns) == (0x02, DURATION_S * 10**9)
 
 
 def test_the_radar_of_the_reference_sends_80_words_a_second() -> None:
     brief = REFERENCE.model_copy(update={"flight": REFERENCE.flight.model_copy(update={"duration_s": 1.0})})
-    radar_words = [packet for packet in (parse(*pair) for pair in traffic.traffic(brief)) if packet.type == 0x20]
+    radar_words = [packet for packet in (parse(*pair) for pair in units(brief, stream())) if packet.type == 0x20]
     assert len(radar_words) == 80
     assert {packet.body[2] for packet in radar_words} == {0xB4}
 

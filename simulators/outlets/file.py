@@ -1,0 +1,25 @@
+"""The traffic in a file."""
+
+from io import BufferedWriter
+from pathlib import Path
+
+from simulators.outlets.base import Closing
+
+
+class FileOutlet(Closing):
+    """The stream as a file, made anew when the first packet is there to be written."""
+
+    def __init__(self, path: Path) -> None:
+        self.place = ""
+        self._path = path
+        self._file: BufferedWriter | None = None
+
+    def write(self, data: bytes) -> None:
+        """Append to the file; raises OSError when it cannot."""
+        self._file = self._file or self._path.open("wb")
+        self._file.write(data)
+
+    def close(self) -> None:
+        """Finish the file. Raises OSError when it cannot."""
+        if self._file:
+            self._file.close()

@@ -1,0 +1,52 @@
+"""Outlets by the names that `simulate --to` takes."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from simulators import carriers
+from simulators.carriers import Carrier
+from simulators.outlets import FileOutlet, PtyOutlet, SlcanOutlet, TcpOutlet, UdpOutlet
+
+FORMS = "pty, tcp:PORT, file:PATH, udp:HOST:PORT, slcan or can:INTERFACE:CHANNEL; the last two take ?fd=true"
+FD = "?fd=true"
+LAST_PORT = 65_535
+
+
+class Way(NamedTuple):
+    """An outlet, and how packets are carried to it."""
+
+    outlet: Any
+    carrier: Carrier[Any]
+
+
+def named(text: str) -> Way:
+    """The outlet of a name; its `place` is what a gateway calls it, if it can listen to it.
+
+    Raises ValueError for any other text, and OSError where the system does not grant it.
+    """
+    fd = text.startswith(("slcan", "can:")) and text.endswith(FD)
+    kind, _, address = (text.removesuffix(FD) if fd else text).partition(":")
+    match kind:
+        case "pty" if not address:
+            return Way(PtyOutlet(), carriers.stream())
+        case "tcp":
+            return Way(TcpOutlet(_port(address or "0")), carriers.stream())
+        case "file" if address:
+            return Way(FileOutlet(Path(address)), carriers.stream())
+        case "udp" if ":" in address:
+            host, _, port = address.rpartition(":")
+            return Way(UdpOutlet(host, _port(port)), carriers.datagram())
+        case "slcan" if not address:
+            return Way(SlcanOutlet(), carriers.slcan(fd))
+        case "can" if ":" in address:
+            from simulators.outlets.canbus import CanOutlet  # noqa: PLC0415 # python-can takes its time to import
+
+            interface, _, channel = address.partition(":")
+            return Way(CanOutlet(interface, channel, fd), carriers.can(fd))
+    raise ValueError(f"use {FORMS}")
+
+
+def _port(text: str) -> int:
+    if not (text.isdecimal() and int(text) <= LAST_PORT):
+        raise ValueError(f"{text!r} is no port: use 1 to {LAST_PORT}, or for tcp 0 for a free one")
+    return int(text)
