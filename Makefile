@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test lint bench integrity sensitivity latency load calibration setup lock clean
+.PHONY: demo test lint bench integrity sensitivity latency load full-load calibration setup lock clean
 
 demo: $(READY)
 	$(BIN)/shadebus demo
@@ -34,6 +34,10 @@ latency: $(READY)
 # What share of one core a rack at live rates takes.
 load: $(READY)
 	$(BIN)/python -m benchmarks.load
+
+# Full buses over each kind of line for a minute: words lost, share of a core, memory, and time to the event.
+full-load: $(READY)
+	$(BIN)/python -m benchmarks.full_load
 
 # The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
 calibration: $(READY)

@@ -1,6 +1,6 @@
 """One bridge as the gateway knows it: its channels, its packet counter, its losses."""
 
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -20,6 +20,7 @@ from gateway.framing import form_of
 from monitor.utc import TIME, UTC_LABELS
 
 SEQUENCE_RANGE = 1 << 32
+LARGEST_LEAP = 1 << 24  # words from a heartbeat to the next: twenty minutes of a full rack
 RECENT = 32  # packets among which a network may repeat or overtake one
 FLAG_NAMES = {
     f.FLAG_FIFO_OVERFLOW: "fifo_overflow",
@@ -74,23 +75,24 @@ class Channel708:
 
 @dataclass
 class Sent:
-    """What a bridge says that it sent on a channel, against what arrived."""
+    """What a bridge says that it sent on a channel, against what arrived.
 
-    said: int  # in its last heartbeat
-    expected: int  # to have arrived by then
+    A heartbeat continues that one of the two before it from which it is nearer ahead. So a single wrong one, as a line
+    without a checksum may give it, is put right by the next; one that continues neither is of a bridge that began anew.
+    """
+
     missing: int = 0
+    _before: list[tuple[int, int]] = field(default_factory=list)  # said, and expected to have arrived by then
 
     def say(self, received: int, arrived: int) -> int:
-        """Take the next heartbeat; how many more words are missing than ever before.
-
-        A bridge that began to count anew is believed from there on.
-        """
-        more = (received - self.said) % SEQUENCE_RANGE
-        self.said = received
-        self.expected = self.expected + more if more < SEQUENCE_RANGE // 2 else arrived + self.missing
-        new = max(self.expected - arrived - self.missing, 0)
-        self.missing += new
-        return new
+        """Take the next heartbeat; how many more words are missing than before it, or fewer."""
+        ahead = [((received - said) % SEQUENCE_RANGE, expected) for said, expected in self._before]
+        more, expected = min(ahead, default=(LARGEST_LEAP, 0))
+        now_expected = expected + more if more < LARGEST_LEAP else arrived + self.missing
+        self._before = [*self._before[-1:], (received, now_expected)]
+        change = max(now_expected - arrived, 0) - self.missing
+        self.missing += change
+        return change
 
 
 @dataclass
@@ -108,7 +110,7 @@ class Link:
     _next_sequence: int | None = None
     _said: dict[int, int] = field(default_factory=dict)  # by channel, its equipment as its last label 377 said
     _lost: dict[int, int] = field(default_factory=dict)  # by channel, as the last heartbeat said
-    _sent: dict[int, Sent] = field(default_factory=dict)  # by channel
+    _sent: defaultdict[int, Sent] = field(default_factory=lambda: defaultdict(Sent))  # by channel
 
     def __post_init__(self) -> None:
         form = form_of(self.config)
@@ -234,10 +236,9 @@ class Link:
         self.losses["words lost in the bridge"] += lost
         for count in counts:
             arrived = self.arrived[count.channel]
-            sent = self._sent.setdefault(count.channel, Sent(count.received, arrived))
-            new = sent.say(count.received, arrived)
-            self.counters["words_lost_on_link"] += new
-            self.losses["words lost on the link"] += new
+            change = self._sent[count.channel].say(count.received, arrived)
+            self.counters["words_lost_on_link"] += change
+            self.losses["words lost on the link"] += max(change, 0)
 
     def dropped(self, count: int) -> None:
         """Count bytes, frames or datagrams that the gateway or its kernel had no room for."""

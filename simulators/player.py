@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from simulators.carriers import Unit
+from simulators.faults.plug import Plug
 from simulators.outlets import Closed, Outlet
 
 
@@ -19,7 +20,7 @@ class Played:
 
 
 def play(
-    units: Iterable[tuple[int, Unit]],
+    units: Iterable[tuple[int, Unit | Plug]],
     outlet: Outlet[Unit],
     speed: float = 1.0,
     stop: threading.Event | None = None,
@@ -27,8 +28,8 @@ def play(
     """Write units when their device time has come on a monotonic clock, never early; `speed` inf does not wait.
 
     The clock starts when the first unit has gone out. Ends with the traffic, at `stop`, or when the outlet's reader
-    leaves; a write that waits for a slow reader is ended by closing the outlet. Raises ValueError for a speed that is
-    not positive.
+    leaves; a write that waits for a slow reader is ended by closing the outlet. What happens to the plug happens to
+    the outlet, which must have `unplug` and `replug`. Raises ValueError for a speed that is not positive.
     """
     if not speed > 0:
         raise ValueError(f"speed {speed} must be above 0: 1 is real time, inf does not wait")
@@ -39,6 +40,9 @@ def play(
         due_s = time_ns * 1e-9 / speed
         if halt.wait(max(0.0, origin + due_s - time.monotonic()) if origin is not None else 0.0):
             break
+        if isinstance(unit, Plug):
+            getattr(outlet, unit.value)()
+            continue
         try:
             outlet.write(unit)
         except Closed:

@@ -97,8 +97,26 @@ class Errors(Settings):
     antenna_deg: NotNegative = 0.01
 
 
-class Fault(Settings):
-    """A named fault over a window of flight time; metres belong to `gnss_offset`, degrees to `heading_offset`."""
+class Window(Settings):
+    """Something named that lasts from `start_s` to `stop_s` of the flight."""
+
+    name: str
+    start_s: float = 0.0
+    stop_s: float = float("inf")
+
+    def covers(self, time_ns: int) -> bool:
+        """Whether it lasts at that time."""
+        return self.start_s <= time_ns / 1e9 < self.stop_s
+
+    @model_validator(mode="after")
+    def _window_runs_forward(self) -> Self:
+        if self.stop_s <= self.start_s:
+            raise ValueError(f"fault {self.name} stops at {self.stop_s} s, before it starts: set stop_s after start_s")
+        return self
+
+
+class Fault(Window):
+    """A fault of the instruments; metres belong to `gnss_offset`, degrees to `heading_offset`."""
 
     name: Literal[
         "gnss_no_computed_data",
@@ -111,18 +129,60 @@ class Fault(Settings):
         "radar_silent",
         "scanner_stuck",
     ]
-    start_s: float = 0.0
-    stop_s: float = float("inf")
     north_m: float = 0.0
     east_m: float = 0.0
     up_m: float = 0.0
     heading_deg: float = 0.0
 
+
+class LinkFault(Window):
+    """A fault between the buses and the host.
+
+    `chance` is the share of packets or, on a line, of units that are hit; `rate_hz` how often garbage comes; `channel`
+    the only one concerned; `clock_s` where the device's clock goes on after a jump.
+    """
+
+    name: Literal[
+        "babble",
+        "bit_flips",
+        "clock_jump",
+        "cut",
+        "doubled",
+        "fifo_overflow",
+        "garbage",
+        "lost",
+        "parity_errors",
+        "stall",
+        "stuck",
+        "truncated",
+        "unplug",
+        "word_length_errors",
+        "wrong_crc",
+    ]
+    chance: float = Field(default=1.0, gt=0, le=1)
+    rate_hz: Positive = 100.0
+    channel: int | None = Field(default=None, ge=0, le=255)
+    clock_s: NotNegative = 0.0
+
     @model_validator(mode="after")
-    def _window_runs_forward(self) -> Self:
-        if self.stop_s <= self.start_s:
-            raise ValueError(f"fault {self.name} stops at {self.stop_s} s, before it starts: set stop_s after start_s")
+    def _takes_what_it_is_given(self) -> Self:
+        strange = self.model_fields_set - {"name", "start_s", "stop_s"} - LINK_FAULT_SETTINGS.get(self.name, {"chance"})
+        if strange:
+            raise ValueError(f"link fault {self.name} takes no {', '.join(sorted(strange))}: leave it out")
         return self
+
+
+LINK_FAULT_SETTINGS = {  # of those that do not take `chance` alone
+    "babble": {"channel"},
+    "clock_jump": {"clock_s"},
+    "cut": set[str](),
+    "fifo_overflow": {"chance", "channel"},
+    "garbage": {"rate_hz"},
+    "parity_errors": {"chance", "channel"},
+    "stall": set[str](),
+    "unplug": set[str](),
+    "word_length_errors": {"chance", "channel"},
+}
 
 
 class Scenario(Settings):
@@ -133,6 +193,7 @@ class Scenario(Settings):
     radar: Radar = Radar()
     errors: Errors = Errors()
     faults: tuple[Fault, ...] = ()
+    link_faults: tuple[LinkFault, ...] = ()
     epoch: AwareDatetime = datetime(2026, 6, 1, 12, 0, 0, tzinfo=UTC)
     gnss_interval_s: float = Field(default=1.0, ge=0.1, le=2.0)
     seed: int = Field(default=0, ge=0)

@@ -8,6 +8,7 @@ import numpy as np
 from decoders.formats import KIND_708
 from simulators import bridge
 from simulators.bridge import Bridge
+from simulators.faults import device, through
 from simulators.flight import Trajectory, Truth
 from simulators.instruments import Channel, channels
 from simulators.ledger import Ledger
@@ -65,7 +66,8 @@ def traffic(scenario: Scenario, ledger: Ledger | None = None) -> Iterator[tuple[
     simulation = prepare(scenario)
     buses = channels(scenario, simulation.trajectory, simulation.ground)
     kinds = {RADAR_CHANNEL: (KIND_708, 0)} | {bus.number: (bus.kind, bus.equipment) for bus in buses}
-    yield from Bridge(kinds, ledger or Ledger()).packets(_dues(simulation, buses))
+    dues = through(_dues(simulation, buses), scenario.link_faults, device.FAULTS, scenario.seed)
+    yield from Bridge(kinds, Ledger() if ledger is None else ledger).packets(dues)
 
 
 def _dues(simulation: Simulation, buses: Sequence[Channel]) -> Iterator[Due]:

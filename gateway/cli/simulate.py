@@ -1,8 +1,9 @@
 """`shadebus simulate`: a simulated flight as byte-exact bus traffic."""
 
 import threading
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -28,6 +29,7 @@ def simulate(
 
     stop = Stop()  # before the imports that take their time
     from gateway.errors import GatewayError
+    from simulators.faults.plug import plugged
     from simulators.link import units
     from simulators.outlets import FileOutlet
     from simulators.outlets.named import named
@@ -52,12 +54,14 @@ def simulate(
         typer.echo(outlet.place)
     if isinstance(outlet, FileOutlet):
         speed = float("inf")
+    if any(fault.name == "unplug" for fault in plan.link_faults) and not hasattr(outlet, "unplug"):
+        raise GatewayError(f"--to {to}: this cannot be unplugged, as the scenario wants: choose pty, tcp or slcan")
     if hasattr(outlet, "on_stall"):
         outlet.on_stall = lambda: typer.echo(f"{outlet.place} is full: waiting for a reader", err=True)
     threading.Thread(target=lambda: stop.wait() and outlet.close(), daemon=True).start()  # also while it waits
     try:
         with outlet:
-            played = play(units(plan, carrier), outlet, speed, stop)
+            played = play(_telling(plugged(units(plan, carrier), plan), outlet), outlet, speed, stop)
     except OSError as error:  # from the system, or in words from what reads the terrain
         place = error.filename or f"--to {to}"
         told = f"{place}: {error.strerror}: choose another" if error.strerror else f"simulation: {error}"
@@ -68,3 +72,13 @@ def simulate(
         return
     sent = f"{played.units} {UNITS[carrier.name]}, {played.size_bytes} bytes"
     typer.echo(f"{sent}, at worst {played.worst_lateness_s * 1e3:.1f} ms late", err=True)
+
+
+def _telling(units: Iterator[tuple[int, Any]], outlet: Any) -> Iterator[tuple[int, Any]]:
+    """The same; says where the outlet is when it has been plugged in again, as the name may be another."""
+    from simulators.faults.plug import Plug
+
+    for ready_ns, unit in units:
+        yield ready_ns, unit
+        if unit is Plug.IN:
+            typer.echo(outlet.place)

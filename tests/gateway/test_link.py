@@ -80,6 +80,8 @@ def test_words_lost_in_the_bridge_are_the_growth_of_what_its_heartbeats_say() ->
         ((2**32 - 5, 5, 15), (0, 10, 19), (0, 0, 1)),  # the count wraps
         ((100, 0, 10), (100, 103, 113), (0, 0, 0)),  # the bridge began anew
         ((0, 10, 20), (0, 12, 20), (0, 0, 0)),  # a heartbeat that came a little late
+        ((0, 10, 74, 30), (0, 10, 20, 30), (0, 0, 54, 0)),  # one altered on its way
+        ((40, 50, 12, 70), (0, 10, 20, 28), (0, 0, 0, 2)),  # and one that looks like a new beginning
     ],
 )
 def test_what_a_bridge_says_that_it_sent_and_did_not_arrive_is_lost_on_the_link(
@@ -90,7 +92,7 @@ def test_what_a_bridge_says_that_it_sent_and_did_not_arrive_is_lost_on_the_link(
         link.arrived[1] = words
         link.heartbeat((ChannelCount(1, received, 0),))
         assert link.counters["words_lost_on_link"] == missing
-    told = [f"degraded: bridge: {lost[-1]} words lost on the link"] if lost[-1] else []
+    told = [f"degraded: bridge: {max(lost)} words lost on the link"] if max(lost) else []
     assert link.take_losses() == told
 
 

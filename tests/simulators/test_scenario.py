@@ -56,3 +56,31 @@ def test_a_wrong_file_is_refused_naming_file_and_key(tmp_path: Path, text: str, 
     with pytest.raises(ValueError, match=r"rack\.toml") as error:
         scenario.load(write(tmp_path, text))
     assert named in str(error.value)
+
+
+def test_link_faults_are_a_list_of_tables(tmp_path: Path) -> None:
+    more = '[[link_faults]]\nname = "lost"\nchance = 0.1\n[[link_faults]]\nname = "unplug"\nstart_s = 5\nstop_s = 6\n'
+    loaded = scenario.load(write(tmp_path, MINIMAL + more))
+    assert [fault.name for fault in loaded.link_faults] == ["lost", "unplug"]
+
+
+@pytest.mark.parametrize(
+    ("table", "named"),
+    [
+        ('name = "flat_tyre"', "word_length_errors"),
+        ('name = "cut"\nchance = 0.5', "link fault cut takes no chance"),
+        ('name = "lost"\nclock_s = 0.5', "link fault lost takes no clock_s"),
+        ('name = "lost"\nchance = 2', "chance"),
+        ('name = "cut"\nstart_s = 5\nstop_s = 5', "set stop_s after start_s"),
+    ],
+)
+def test_a_wrong_link_fault_is_refused_naming_what_it_takes(tmp_path: Path, table: str, named: str) -> None:
+    with pytest.raises(ValueError, match=r"rack\.toml") as error:
+        scenario.load(write(tmp_path, f"{MINIMAL}[[link_faults]]\n{table}\n"))
+    assert named in str(error.value)
+
+
+def test_the_example_with_a_broken_link_loads() -> None:
+    loaded = scenario.load(Path(__file__).parents[2] / "examples" / "broken_link.toml")
+    assert {fault.name for fault in loaded.link_faults} >= {"unplug", "fifo_overflow", "bit_flips"}
+    assert loaded.world.path.exists()
