@@ -69,15 +69,14 @@ def linked_ports() -> Iterator[None]:
             ip("set", name, "down")
 
 
-def send(interface: str, frames: Iterable[Frame], *, fd: bool = False, gap_s: float = 0.0) -> None:
-    """Send frames as any other program would; an emulated controller wants a gap between them."""
+def send(interface: str, frames: Iterable[Frame], *, fd: bool = False) -> None:
+    """Send frames as any other program would."""
     form = "=IBBxx64s" if fd else "=IBBxx8s"
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as line:
         line.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
         line.bind((interface,))
         for identifier, data in frames:
             line.send(struct.pack(form, EXTENDED | identifier, len(data), 0, data))
-            time.sleep(gap_s)
 
 
 def slcan_text(frames: Iterable[Frame]) -> bytes:

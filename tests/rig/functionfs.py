@@ -43,7 +43,7 @@ class BulkBridge:
         self._endpoint = endpoint
 
     def send(self, data: bytes) -> None:
-        """One transfer, taken when this returns; waits for a reader. OSError once the device is unplugged."""
+        """One transfer, taken when this returns; waits for a reader. OSError while the device is unplugged."""
         os.write(self._endpoint, data)
 
 
@@ -57,7 +57,7 @@ def bulk_bridge(serial_number: str = "bulk-1") -> Iterator[BulkBridge]:
     control = os.open(MOUNT / "ep0", os.O_RDWR)
     os.write(control, _descriptors())
     os.write(control, _strings())
-    endpoint = os.open(MOUNT / "ep1", os.O_RDWR)
+    endpoint = os.open(MOUNT / "ep1", os.O_RDWR | os.O_NONBLOCK)  # an error while unplugged; it waits for readers anyway
     gadget.plug()
     try:
         yield BulkBridge(gadget, endpoint)

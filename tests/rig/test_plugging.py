@@ -5,7 +5,6 @@ import os
 import threading
 import tty
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 
@@ -16,7 +15,7 @@ from tests.rig.gadget import Gadget, serial_line
 from tests.rig.watched import DEADLINE_S, Watched, wait_until
 from tests.rig.words import frames
 
-GATEWAY_SIDE, BRIDGE_SIDE = Path("/dev/ttyACM0"), Path("/dev/ttyGS0")
+GATEWAY_SIDE, BRIDGE_SIDE = "/dev/ttyACM0", "/dev/ttyGS0"
 Send = Callable[[bytes], object]
 
 
@@ -24,7 +23,7 @@ class Feeder(threading.Thread):
     """Sends numbered packets until it is told to stop or its device is pulled out; `next` is the next number."""
 
     def __init__(self, send: Send, first: int) -> None:
-        super().__init__()
+        super().__init__(daemon=True)
         self.next = first
         self._send = send
         self._stopping = threading.Event()
@@ -52,6 +51,14 @@ def bridge_side() -> Iterator[int]:
         os.close(line)
 
 
+def commands(line: int) -> list[str]:
+    """What a serial CAN bridge is told until it opens its bus."""
+    said = b""
+    while not said.endswith(b"O\r"):
+        said += os.read(line, 100)
+    return said.decode().split("\r")
+
+
 @contextlib.contextmanager
 def sender(device: Gadget | BulkBridge) -> Iterator[Send]:
     if isinstance(device, BulkBridge):
@@ -64,7 +71,7 @@ def sender(device: Gadget | BulkBridge) -> Iterator[Send]:
 @pytest.mark.parametrize(
     ("source", "device"),
     [
-        ("serial:/dev/ttyACM0", serial_line),
+        (f"serial:{GATEWAY_SIDE}", serial_line),
         ("serial:hwgrep://1209:7081", serial_line),
         ("usb:1209:7080", bulk_bridge),
         ("usb:1209:7080:bulk-1", bulk_bridge),
@@ -119,25 +126,19 @@ def test_a_device_is_told_from_its_twin_by_its_serial_number() -> None:
 
 
 def test_a_serial_can_bridge_is_told_to_open_its_bus_again_after_it_was_unplugged() -> None:
-    with serial_line() as gadget, Watched(f"can:slcan:{GATEWAY_SIDE}?bitrate=1000000") as watched:
-        watched.wait_up()
+    with serial_line() as gadget, contextlib.ExitStack() as stack:
         with bridge_side() as line:
-            assert _commands(line) == b"C\rS8\rO\r"
+            watched = stack.enter_context(Watched(f"can:slcan:{GATEWAY_SIDE}?bitrate=1000000"))
+            assert commands(line)[:2] == ["C", "S8"]  # close, 1 Mbit/s
+            watched.wait_up()
             write_line(line, slcan_text(frames(range(50))))
             watched.wait_words(50)
             gadget.unplug()
         watched.wait_lost()
         gadget.plug()
-        watched.wait_up(2)
         with bridge_side() as line:
+            assert commands(line)[:2] == ["C", "S8"]  # close, 1 Mbit/s
+            watched.wait_up(2)
             write_line(line, slcan_text(frames(range(50, 100))))
             watched.wait_words(100)
     assert watched.words == [words.word(number) for number in range(100)]
-
-
-def _commands(line: int) -> bytes:
-    """What the gateway has told the bridge so far."""
-    said = b""
-    while not said.endswith(b"O\r"):
-        said += os.read(line, 100)
-    return said

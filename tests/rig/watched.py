@@ -40,7 +40,7 @@ class Watched:
         self.recorded = b""
         self.lost = 0
         self._supervisor = Supervisor(config.name, make_adapter(config), self._take, self._say)
-        self._thread = threading.Thread(target=self._supervisor.run)
+        self._thread = threading.Thread(target=self._supervisor.run, daemon=True)
 
     def wait_up(self, times: int = 1) -> None:
         """Until the line was opened so many times."""
@@ -80,7 +80,9 @@ class Watched:
         self._thread.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._supervisor.stop()
         self._thread.join(DEADLINE_S)
         assert self.states[-1] == "CLOSED"

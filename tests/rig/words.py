@@ -52,11 +52,9 @@ def radar_word(number: int) -> bytes:
 def radar_frames(number: int) -> list[Frame]:
     """The FD frames of a radar word; the last one is filled up to a length that FD has, 24."""
     said = struct.pack("<QHB", 5_000_000 * number, 1600, 0) + radar_word(number)
-    parts = [said[start : start + CAN_FD_ROOM] for start in range(0, len(said), CAN_FD_ROOM)]
-    return [
-        Frame(_identifier(CAN_RADAR, segment), (bytes([number % 256]) + part).ljust(64 if len(part) > 23 else 24, b"\0"))
-        for segment, part in enumerate(parts)
-    ]
+    parts = [bytes([number % 256]) + said[start : start + CAN_FD_ROOM] for start in range(0, len(said), CAN_FD_ROOM)]
+    parts[-1] = parts[-1].ljust(24, b"\0")
+    return [Frame(_identifier(CAN_RADAR, segment), part) for segment, part in enumerate(parts)]
 
 
 def _identifier(kind: int, index: int) -> int:
