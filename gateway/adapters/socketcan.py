@@ -29,23 +29,22 @@ class SocketCanPort:
 
     def __init__(self, line: socket.socket) -> None:
         self._line = line
-        self._overflows = Overflows()
+        self._overflows = Overflows(line)
 
     def read(self) -> Reading:
         """The frames that have come, up to 512. Raises OSError once the interface is down or gone."""
         if not wait(self._line):
             return NOTHING
-        chunk, count, lost = bytearray(), 0, 0
+        chunk, count = bytearray(), 0
         with contextlib.suppress(BlockingIOError):
             while count < MOST_AT_ONCE:
-                frame, beside, _, _ = self._line.recvmsg(LARGEST_FRAME, Overflows.SPACE)
-                lost += self._overflows.since(beside)
+                frame = self._line.recv(LARGEST_FRAME)
                 identifier, length, flags = FRAME.unpack_from(frame)
                 flags |= FD_FRAME * (len(frame) == LARGEST_FRAME)
                 chunk += HEAD.pack(time.monotonic_ns(), identifier, flags, length)
                 chunk += frame[FRAME.size : FRAME.size + length]
                 count += 1
-        return Reading(bytes(chunk), count, lost)
+        return Reading(bytes(chunk), count, self._overflows.new())
 
     def close(self) -> None:
         """Close the socket."""
