@@ -40,6 +40,6 @@ class Overflows:
     def new(self) -> int:
         """How many messages were dropped since the last call."""
         *_, dropped = MEMINFO.unpack(self._line.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, MEMINFO.size))
-        new = (dropped - self._dropped) % WRAP
+        new = int(dropped - self._dropped) % WRAP
         self._dropped = dropped
         return new
