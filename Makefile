@@ -3,13 +3,19 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test lint bench integrity sensitivity latency load full-load calibration dbc setup lock clean
+.PHONY: demo test rig-test lint bench integrity sensitivity latency load full-load soak calibration dbc setup lock clean
 
 demo: $(READY)
 	$(BIN)/shadebus demo
 
 test: lint
 	$(BIN)/pytest
+
+# The adapters against a real kernel and its devices, in a machine that QEMU emulates; see docs/rig.md. Plugins that
+# these tests do not use would take longer to import there than the tests themselves.
+rig-test: $(READY)
+	tests/rig/vm.sh env PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 \
+	  $(BIN)/pytest -o addopts="-q --import-mode=importlib" -p no:cacheprovider --durations=5 tests/rig
 
 lint: $(READY)
 	$(BIN)/ruff check

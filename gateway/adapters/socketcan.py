@@ -29,23 +29,36 @@ class SocketCanPort:
 
     def __init__(self, line: socket.socket) -> None:
         self._line = line
-        self._overflows = Overflows()
+        self._overflows = Overflows(line)
+        self._end: OSError | None = None
 
     def read(self) -> Reading:
-        """The frames that have come, up to 512. Raises OSError once the interface is down or gone."""
-        if not wait(self._line):
+        """The frames that have come, up to 512. Raises OSError once the interface is down or gone and none is left."""
+        if not self._end and not wait(self._line):
             return NOTHING
-        chunk, count, lost = bytearray(), 0, 0
+        chunk, count = bytearray(), 0
         with contextlib.suppress(BlockingIOError):
             while count < MOST_AT_ONCE:
-                frame, beside, _, _ = self._line.recvmsg(LARGEST_FRAME, Overflows.SPACE)
-                lost += self._overflows.since(beside)
+                frame = self._receive()
                 identifier, length, flags = FRAME.unpack_from(frame)
                 flags |= FD_FRAME * (len(frame) == LARGEST_FRAME)
                 chunk += HEAD.pack(time.monotonic_ns(), identifier, flags, length)
                 chunk += frame[FRAME.size : FRAME.size + length]
                 count += 1
+        lost = self._overflows.new()
+        if self._end and not count and not lost:
+            raise self._end
         return Reading(bytes(chunk), count, lost)
+
+    def _receive(self) -> bytes:
+        """The next frame. The end of the interface, which the kernel tells before frames that still wait, is noted."""
+        try:
+            return self._line.recv(LARGEST_FRAME)
+        except BlockingIOError:
+            raise
+        except OSError as error:
+            self._end = error
+            return self._line.recv(LARGEST_FRAME)
 
     def close(self) -> None:
         """Close the socket."""

@@ -4,21 +4,20 @@ import contextlib
 import select
 import socket
 import struct
-from collections.abc import Iterable
 
 LONGEST_WAIT_S = 0.2  # so that a silent line still notices the order to stop
 RECEIVE_BYTES = 8 << 20  # a second and more of everything, counted with the kernel's overhead
 SO_RCVBUFFORCE = 33  # Linux: beyond net.core.rmem_max, for root
-SO_RXQ_OVFL = 40  # Linux: each message tells how many were dropped before it
+SO_MEMINFO = 55  # Linux: what a socket holds in memory, and how many messages it had to drop
+MEMINFO = struct.Struct("9I")
 WRAP = 1 << 32
 
 
 def prepare(line: socket.socket, receive_bytes: int) -> None:
-    """Ask for room in the kernel and for the count of what finds none; reads do not wait from now on."""
+    """Ask for room in the kernel; reads do not wait from now on."""
     line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)
     with contextlib.suppress(PermissionError):
         line.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, receive_bytes)
-    line.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
     line.setblocking(False)
 
 
@@ -29,19 +28,18 @@ def wait(line: socket.socket) -> bool:
 
 
 class Overflows:
-    """The kernel's counter of dropped messages, which comes beside a message once any was dropped."""
+    """The kernel's count of messages that a socket had to drop.
 
-    SPACE = socket.CMSG_SPACE(4)
+    SO_RXQ_OVFL would tell it beside the next message only: of a burst that nothing follows, never.
+    """
 
-    def __init__(self) -> None:
+    def __init__(self, line: socket.socket) -> None:
+        self._line = line
         self._dropped = 0
 
-    def since(self, beside: Iterable[tuple[int, int, bytes]]) -> int:
-        """How many messages were dropped between the one before and the one with this beside it."""
-        for level, kind, data in beside:
-            if (level, kind) == (socket.SOL_SOCKET, SO_RXQ_OVFL):
-                (dropped,) = struct.unpack("I", data[:4])
-                new = int(dropped - self._dropped) % WRAP
-                self._dropped = dropped
-                return new
-        return 0
+    def new(self) -> int:
+        """How many messages were dropped since the last call."""
+        *_, dropped = MEMINFO.unpack(self._line.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, MEMINFO.size))
+        new = int(dropped - self._dropped) % WRAP
+        self._dropped = dropped
+        return new

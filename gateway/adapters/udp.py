@@ -33,24 +33,23 @@ class UdpPort:
     def __init__(self, line: socket.socket, senders: frozenset[str]) -> None:
         self._line = line
         self._senders = senders
-        self._overflows = Overflows()
+        self._overflows = Overflows(line)
         self._strangers: set[str] = set()
 
     def read(self) -> Reading:
         """The datagrams that have come, up to 512."""
         if not wait(self._line):
             return NOTHING
-        chunk, count, lost, remark = bytearray(), 0, 0, ""
+        chunk, count, remark = bytearray(), 0, ""
         with contextlib.suppress(BlockingIOError):
             for _ in range(MOST_AT_ONCE):
-                data, more, _, sender = self._line.recvmsg(LARGEST_DATAGRAM, Overflows.SPACE)
-                lost += self._overflows.since(more)
+                data, sender = self._line.recvfrom(LARGEST_DATAGRAM)
                 if self._senders and sender[0] not in self._senders:
                     remark = remark or self._refused(sender[0])
                     continue
                 chunk += HEAD.pack(time.monotonic_ns(), len(data)) + data
                 count += 1
-        return Reading(bytes(chunk), count, lost, remark)
+        return Reading(bytes(chunk), count, self._overflows.new(), remark)
 
     def close(self) -> None:
         """Close the socket."""
