@@ -1,4 +1,4 @@
-"""The words of a channel: what arrived, and what its bridge says of the rest; at each heartbeat sent = arrived + lost."""
+"""The words of a channel: what arrived, and what its bridge says of the rest."""
 
 from dataclasses import dataclass, field
 
