@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test rig-test lint bench integrity sensitivity latency load full-load calibration setup lock clean
+.PHONY: demo test rig-test lint bench integrity sensitivity latency load full-load soak calibration dbc setup lock clean
 
 demo: $(READY)
 	$(BIN)/shadebus demo
@@ -48,6 +48,10 @@ full-load: $(READY)
 # The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
 calibration: $(READY)
 	$(BIN)/python -m benchmarks.calibrate_demo
+
+# The description of our CAN frames for CAN tools, from the formats and label sets.
+dbc: $(READY)
+	$(BIN)/python -m examples.dbc
 
 setup: $(READY)
 

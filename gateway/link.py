@@ -15,12 +15,12 @@ from decoders.framing import Packet, PacketFramer
 from decoders.health429 import EQUIPMENT, BusHealth
 from decoders.profiles import Profile
 from decoders.racklink import ChannelCount, Hello, words429
+from gateway.books import Books
 from gateway.config import AdapterConfig, definitions_of, profile_of
 from gateway.framing import form_of
 from monitor.utc import TIME, UTC_LABELS
 
 SEQUENCE_RANGE = 1 << 32
-LARGEST_LEAP = 1 << 24  # words from a heartbeat to the next: twenty minutes of a full rack
 RECENT = 32  # packets among which a network may repeat or overtake one
 FLAG_NAMES = {
     f.FLAG_FIFO_OVERFLOW: "fifo_overflow",
@@ -74,28 +74,6 @@ class Channel708:
 
 
 @dataclass
-class Sent:
-    """What a bridge says that it sent on a channel, against what arrived.
-
-    A heartbeat continues that one of the two before it from which it is nearer ahead. So a single wrong one, as a line
-    without a checksum may give it, is put right by the next; one that continues neither is of a bridge that began anew.
-    """
-
-    missing: int = 0
-    _before: list[tuple[int, int]] = field(default_factory=list)  # said, and expected to have arrived by then
-
-    def say(self, received: int, arrived: int) -> int:
-        """Take the next heartbeat; how many more words are missing than before it, or fewer."""
-        ahead = [((received - said) % SEQUENCE_RANGE, expected) for said, expected in self._before]
-        more, expected = min(ahead, default=(LARGEST_LEAP, 0))
-        now_expected = expected + more if more < LARGEST_LEAP else arrived + self.missing
-        self._before = [*self._before[-1:], (received, now_expected)]
-        change = max(now_expected - arrived, 0) - self.missing
-        self.missing += change
-        return change
-
-
-@dataclass
 class Link:
     """State of one bridge, kept over reconnections."""
 
@@ -105,12 +83,10 @@ class Link:
     counters: Counter[str] = field(default_factory=Counter)
     losses: Counter[str] = field(default_factory=Counter)  # since the last verdict
     channels: dict[int, Channel429 | Channel708] = field(default_factory=dict)
-    arrived: Counter[int] = field(default_factory=Counter)  # words by channel, used or not
+    books: defaultdict[int, Books] = field(default_factory=lambda: defaultdict(Books))  # by channel
     _recent: deque[Packet] = field(default_factory=lambda: deque(maxlen=RECENT))
     _next_sequence: int | None = None
     _said: dict[int, int] = field(default_factory=dict)  # by channel, its equipment as its last label 377 said
-    _lost: dict[int, int] = field(default_factory=dict)  # by channel, as the last heartbeat said
-    _sent: defaultdict[int, Sent] = field(default_factory=lambda: defaultdict(Sent))  # by channel
 
     def __post_init__(self) -> None:
         form = form_of(self.config)
@@ -126,7 +102,7 @@ class Link:
     def succeed(self, before: "Link") -> None:
         """Take over the channels and counters of a link whose pipeline failed; bytes half framed are lost with it."""
         self.channels, self.counters, self.losses = before.channels, before.counters, before.losses
-        self.arrived, self._sent, self._lost = before.arrived, before._sent, before._lost
+        self.books = before.books
         self.framer.succeed(before.framer)
 
     def hello(self, hello: Hello) -> None:
@@ -229,16 +205,11 @@ class Link:
         return channel if isinstance(channel, Channel708) else None
 
     def heartbeat(self, counts: tuple[ChannelCount, ...]) -> None:
-        """Take what the bridge says it lost itself and what it sent, and count what is new of it as lost."""
-        lost = sum((count.lost - self._lost.get(count.channel, count.lost)) % SEQUENCE_RANGE for count in counts)
-        self._lost |= {count.channel: count.lost for count in counts}
-        self.counters["words_lost_in_bridge"] += lost
-        self.losses["words lost in the bridge"] += lost
+        """Take what the bridge says that it sent and that it lost itself; what is newly lost is told."""
+        before = self._words_lost()
         for count in counts:
-            arrived = self.arrived[count.channel]
-            change = self._sent[count.channel].say(count.received, arrived)
-            self.counters["words_lost_on_link"] += change
-            self.losses["words lost on the link"] += max(change, 0)
+            self.books[count.channel].say(count)
+        self.losses.update({what: max(lost - before[what], 0) for what, lost in self._words_lost().items()})
 
     def dropped(self, count: int) -> None:
         """Count bytes, frames or datagrams that the gateway or its kernel had no room for."""
@@ -258,4 +229,17 @@ class Link:
             for number, channel in self.channels.items()
             if isinstance(channel, Channel429)
         }
-        return {**self.framer.counters(), **self.counters, **peaks}
+        words = {
+            f"channel_{number}.{name}": count
+            for number, books in self.books.items()
+            for name, count in books.counters().items()
+        }
+        lost = {what.replace(" ", "_").replace("_the_", "_"): count for what, count in self._words_lost().items()}
+        return {**self.framer.counters(), **self.counters, **lost, **words, **peaks}
+
+    def _words_lost(self) -> dict[str, int]:
+        """Words lost on all channels, by where."""
+        return {
+            "words lost in the bridge": sum(books.lost_in_bridge for books in self.books.values()),
+            "words lost on the link": sum(books.lost_on_link for books in self.books.values()),
+        }

@@ -179,7 +179,7 @@ class Pipeline:
     def _words(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         block = words429(packet)
         link.counters["words_429"] += len(block.words)
-        link.arrived[packet.channel] += len(block.words)
+        link.books[packet.channel].arrived += len(block.words)
         in_order = bool(np.all(np.diff(block.time_ns) >= 0))
         if not (block.well_formed and in_order):
             link.counters["malformed_bodies"] += 1
@@ -220,7 +220,7 @@ class Pipeline:
     def _radar(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
         word = radar_word(packet)
         link.counters["words_708"] += 1
-        link.arrived[packet.channel] += 1
+        link.books[packet.channel].arrived += 1
         channel = link.radar(packet.channel)
         whole = not channel or word.bit_count == channel.profile.word_bits
         if channel and not whole:

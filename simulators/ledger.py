@@ -1,7 +1,11 @@
 """The books of one bridge, to the word: what its buses carried, and what of that never left the bridge."""
 
+import struct
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field
+
+from cobs import cobs
 
 from simulators import racklink
 
@@ -36,9 +40,15 @@ class Ledger:
             self.overflowed.add(channel)
 
     def lose_frame(self, frame: bytes) -> None:
-        """A packet that the bridge had numbered and framed already is lost inside it."""
-        packet = racklink.unpacked(racklink.unframed(frame))
-        self.lose(packet.channel, packet.type, packet.words)
+        """A packet that the bridge had numbered and framed already is lost inside it.
+
+        The words of one that another fault had spoilt before were lost on the link, and are counted there.
+        """
+        with suppress(cobs.DecodeError, struct.error):
+            packed = racklink.unframed(frame)
+            packet = racklink.unpacked(packed)
+            if racklink.packed(packet) == packed:
+                self.lose(packet.channel, packet.type, packet.words)
 
     def counts(self, channel: int) -> tuple[int, int]:
         """Words received and words lost, as a heartbeat says them."""

@@ -9,6 +9,7 @@ import typer
 from gateway import kernel_cache
 from gateway.cli.decode import decode_429, decode_708
 from gateway.cli.demo import demo
+from gateway.cli.devices import devices
 from gateway.cli.doctor import doctor
 from gateway.cli.dump import dump
 from gateway.cli.info import info
@@ -25,7 +26,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for verb in (demo, run, simulate, replay, dump, info, labels, thresholds, doctor):
+for verb in (demo, run, simulate, replay, dump, info, labels, thresholds, devices, doctor):
     app.command()(verb)
 
 decode = typer.Typer(help="Explain one bus word, field by field.", no_args_is_help=True)

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from itertools import count
 from typing import Any
 
 from cobs import cobs
 from numpy.random import Generator
 
-from decoders.formats import CAN_FD_LENGTHS
+from decoders.formats import CAN_FD_LENGTHS, CAN_PREFIX
 from simulators import racklink
 from simulators.carriers import Frame, Name, Unit
 from simulators.faults import Change
@@ -89,20 +90,20 @@ def _stall(units: Iterator[Timed], fault: LinkFault, _: Generator) -> Iterator[T
 
 def _garbage(units: Iterator[Timed], fault: LinkFault, rng: Generator) -> Iterator[Timed]:
     """Random units `rate_hz` times a second between the others."""
-    number = 0
+    times_ns = (round((fault.start_s + number / fault.rate_hz) * 1e9) for number in count())
+    garbage_ns = next(times_ns)
     for ready_ns, unit in units:
-        while (garbage_ns := round((fault.start_s + number / fault.rate_hz) * 1e9)) <= ready_ns and fault.covers(
-            garbage_ns
-        ):
+        while garbage_ns <= ready_ns and fault.covers(garbage_ns):
             yield garbage_ns, _random_like(unit, rng)
-            number += 1
+            garbage_ns = next(times_ns)
         yield ready_ns, unit
 
 
 def _random_like(unit: Unit, rng: Generator) -> Unit:
+    """Random bytes; on CAN a frame of some other device, as one of ours could not be told from the bridge's."""
     if isinstance(unit, Frame):
         length = rng.choice(CAN_FD_LENGTHS if unit.fd else CLASSIC_LENGTHS)
-        return Frame(int(rng.integers(2**29)), rng.bytes(int(length)), unit.fd)
+        return Frame(int(rng.integers(CAN_PREFIX << 24)), rng.bytes(int(length)), unit.fd)
     return rng.bytes(int(rng.integers(1, LONGEST_GARBAGE + 1)))
 
 

@@ -64,7 +64,7 @@ class PtyOutlet(Closing):
     def unplug(self) -> None:
         """Hang up: readers get an error, what they have not read is gone, and what is written now vanishes."""
         with self._lock:
-            if not self._plugged:
+            if not self._plugged or self._closing.is_set():
                 return
             self._plugged = False
             if self._link:
@@ -77,6 +77,8 @@ class PtyOutlet(Closing):
     def replug(self) -> None:
         """Come back, after `unplug` under another name."""
         with self._lock:
+            if self._closing.is_set():
+                return
             self._plugged = True
             if self._link:
                 self._link.unlink(missing_ok=True)

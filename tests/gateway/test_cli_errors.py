@@ -12,7 +12,7 @@ import pytest
 from mcap.writer import Writer
 
 from gateway.config import check_config
-from gateway.doctor import permission_mend
+from gateway.doctor.serial import permission_mend
 from gateway.metadata import build_monitor, describe
 from gateway.recording import Recorder
 from simulators.outlets import PtyOutlet
@@ -39,6 +39,7 @@ main()
 CHANNEL = """[adapters.channels.{}]
 kind = "arinc708"
 """
+BROKEN_LINK = Path(__file__).parents[2] / "examples" / "broken_link.toml"
 RACK = '[[adapters]]\nname = "bridge"\nsource = "serial:/dev/no-such-line"\n'
 
 
@@ -136,6 +137,10 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
         ("--to file:/dev/full: No space left on device: choose another",),
     ),
     "demo without a place": (lambda d: ["demo", "--out", "/proc/no"], ("cannot write to /proc/no", "with --out")),
+    "nothing to unplug": (
+        lambda d: ["simulate", BROKEN_LINK, "--to", f"file:{d / 'out'}"],
+        (": this cannot be unplugged", "choose pty, tcp or slcan"),
+    ),
     "unknown outlet": (
         lambda d: ["simulate", "--to", "tin"],
         ("--to tin: use pty, tcp:PORT, file:PATH, udp:",),

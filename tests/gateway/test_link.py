@@ -66,9 +66,17 @@ def test_losses_are_told_once() -> None:
 
 def test_words_lost_in_the_bridge_are_the_growth_of_what_its_heartbeats_say() -> None:
     link = make()
-    for lost in (5, 5, 9, 2**32 - 1, 0):
+    for lost in (2**32 - 5, 2**32 - 5, 2**32 - 1, 0, 7):
         link.heartbeat((ChannelCount(1, 0, lost), ChannelCount(2, 0, 3)))
-    assert link.counters["words_lost_in_bridge"] == (2**32 - 1 - 5) + 1
+    assert link.all_counters()["words_lost_in_bridge"] == 12
+    assert link.take_losses() == ["degraded: bridge: 12 words lost in the bridge"]
+
+
+def test_a_bridge_that_begins_anew_has_lost_what_it_said_before() -> None:
+    link = make()
+    for lost in (5, 9, 0, 2):
+        link.heartbeat((ChannelCount(1, 0, lost),))
+    assert link.all_counters()["channel_1.words_lost_in_bridge"] == 6
 
 
 @pytest.mark.parametrize(
@@ -89,9 +97,11 @@ def test_what_a_bridge_says_that_it_sent_and_did_not_arrive_is_lost_on_the_link(
 ) -> None:
     link = make()
     for received, words, missing in zip(said, arrived, lost, strict=True):
-        link.arrived[1] = words
+        link.books[1].arrived = words
         link.heartbeat((ChannelCount(1, received, 0),))
-        assert link.counters["words_lost_on_link"] == missing
+        assert (
+            link.all_counters()["words_lost_on_link"] == link.all_counters()["channel_1.words_lost_on_link"] == missing
+        )
     told = [f"degraded: bridge: {max(lost)} words lost on the link"] if max(lost) else []
     assert link.take_losses() == told
 

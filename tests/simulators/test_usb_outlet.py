@@ -14,6 +14,7 @@ from simulators.ledger import Ledger
 from simulators.outlets import Closed
 from simulators.outlets.usb import PACKET_BYTES, PRODUCT, VENDOR, UsbBackend, UsbDevice
 from simulators.racklink import Packet
+from tests.simulators.small_bridge import heard, timed_packets
 
 ENDPOINT = 0x81
 
@@ -183,6 +184,34 @@ def test_a_packet_that_finds_the_fifo_full_is_lost_in_the_device_and_the_ledger_
     assert ledger.counts(1) == (5, 15)
     assert ledger.overflowed == {1}
     assert bytes(opened(device).read(ENDPOINT, 8 * PACKET_BYTES, 100)) == frame
+
+
+@pytest.mark.parametrize("spoilt", [b"", b"\0", b"\7abc\0", b"\1\1\1\0"])
+def test_a_spoilt_packet_that_finds_the_fifo_full_counts_as_lost_on_the_link(spoilt: bytes) -> None:
+    ledger = Ledger()
+    (frame,) = carriers.stream().units(Packet(0x10, 1, 0, 0, 0, bytes(8)))
+    for lost in (spoilt, frame[:10], frame[:-2] + b"\x55\0"):
+        ledger.lose_frame(lost)
+    assert ledger == Ledger()
+
+
+def test_the_heartbeats_of_a_bridge_whose_fifo_overflows_are_right_to_the_word() -> None:
+    ledger = Ledger()
+    device = UsbDevice(fifo_bytes=2000)
+    device.on_lost = ledger.lose_frame
+    host = opened(device)
+    carrier = carriers.stream()
+    came = b""
+    for number, (_, packet) in enumerate(timed_packets(ledger=ledger)):
+        for frame in carrier.units(packet):
+            device.write(frame)
+        if number > 100:  # the host reads late
+            came += bytes(host.read(ENDPOINT, 4096, 100))
+    words, counts = heard([came], "stream")
+    assert sum(lost for _, lost in counts.values()) > 100
+    for channel, (received, lost) in counts.items():
+        assert words[channel] == received
+        assert received + lost == sum(count for (number, _), count in ledger.carried.items() if number == channel)
 
 
 def test_closing_waits_for_the_reader_and_then_pulls_the_plug() -> None:

@@ -1,0 +1,56 @@
+"""The words of a channel: what arrived, and what its bridge says of the rest; at each heartbeat sent = arrived + lost."""
+
+from dataclasses import dataclass, field
+
+from decoders.racklink import ChannelCount
+
+COUNT_RANGE = 1 << 32
+LARGEST_LEAP = 1 << 24  # words from a heartbeat to the next: twenty minutes of a full rack
+
+
+@dataclass
+class Count:
+    """A count in a bridge's heartbeats, of 32 bits, followed over its wraps.
+
+    A heartbeat continues that one of the two before it from which it is nearer ahead. So a single wrong one, as a line
+    without a checksum may give it, is put right by the next; one that continues neither is of a bridge that began anew.
+    """
+
+    value: int = 0
+    _before: list[tuple[int, int]] = field(default_factory=list)  # said, and the value then
+
+    def say(self, said: int, anew: int) -> None:
+        """Take what the next heartbeat says; the value is `anew` if it continues none."""
+        ahead = [((said - earlier) % COUNT_RANGE, value) for earlier, value in self._before]
+        more, value = min(ahead, default=(LARGEST_LEAP, 0))
+        self.value = value + more if more < LARGEST_LEAP else anew
+        self._before = [*self._before[-1:], (said, self.value)]
+
+
+@dataclass
+class Books:
+    """Words of one channel. Listening may begin at any time: what was before the first heartbeat counts as sent."""
+
+    arrived: int = 0
+    lost_on_link: int = 0
+    _expected: Count = field(default_factory=Count)  # to have arrived if the link loses nothing
+    _lost_in_bridge: Count = field(default_factory=Count)
+
+    @property
+    def lost_in_bridge(self) -> int:
+        """Words that never left the bridge."""
+        return self._lost_in_bridge.value
+
+    def say(self, count: ChannelCount) -> None:
+        """Take a heartbeat's counts."""
+        self._expected.say(count.received, self.arrived + self.lost_on_link)
+        self._lost_in_bridge.say(count.lost, self.lost_in_bridge)
+        self.lost_on_link = max(self._expected.value - self.arrived, 0)
+
+    def counters(self) -> dict[str, int]:
+        """Every counter by name."""
+        return {
+            "words": self.arrived,
+            "words_lost_on_link": self.lost_on_link,
+            "words_lost_in_bridge": self.lost_in_bridge,
+        }
