@@ -17,11 +17,15 @@ FRAME = struct.Struct("=IBBxx")  # identifier with flags, length, FD flags: the 
 LARGEST_FRAME = 72
 FD_FRAME = 0x04  # flag of a frame that has FD's form
 MOST_AT_ONCE = 512
+CAN_RAW_ERR_FILTER = 2  # linux/can/raw.h; Python has no name for it
+CONTROLLER, BUS_OFF = 0x04, 0x40  # kinds of error frames, in their identifier; linux/can/error.h
+RX_OVERFLOW = 0x01  # of a controller, in the second byte
 
 MENDS = {
     errno.ENODEV: "no such interface: see `ip link show type can`",
     errno.ENETDOWN: "the interface is down: sudo ip link set {} up type can bitrate 1000000",
 }
+OFF = "the controller is off the bus after too many errors: `ip link set ... type can restart-ms 100` lets it return"
 
 
 class SocketCanPort:
@@ -36,7 +40,7 @@ class SocketCanPort:
         """The frames that have come, up to 512. Raises OSError once the interface is down or gone and none is left."""
         if not self._end and not wait(self._line):
             return NOTHING
-        chunk, count = bytearray(), 0
+        chunk, count, overflows, remark = bytearray(), 0, 0, ""
         with contextlib.suppress(BlockingIOError):
             while count < MOST_AT_ONCE:
                 frame = self._receive()
@@ -45,10 +49,13 @@ class SocketCanPort:
                 chunk += HEAD.pack(time.monotonic_ns(), identifier, flags, length)
                 chunk += frame[FRAME.size : FRAME.size + length]
                 count += 1
-        lost = self._overflows.new()
+                if identifier & f.CAN_ERROR:
+                    overflows += bool(identifier & CONTROLLER and frame[FRAME.size + 1] & RX_OVERFLOW)
+                    remark = OFF if identifier & BUS_OFF else remark
+        lost = overflows + self._overflows.new()  # a controller does not tell how many frames an overflow cost it
         if self._end and not count and not lost:
             raise self._end
-        return Reading(bytes(chunk), count, lost)
+        return Reading(bytes(chunk), count, lost, remark)
 
     def _receive(self) -> bytes:
         """The next frame. The end of the interface, which the kernel tells before frames that still wait, is noted."""
@@ -80,6 +87,7 @@ class SocketCanAdapter:
         try:
             prepare(line, RECEIVE_BYTES)
             line.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
+            line.setsockopt(socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, CONTROLLER | BUS_OFF)
             line.bind((self.interface,))
             trouble = line.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)  # how a raw socket says that it is down
         except OSError as error:

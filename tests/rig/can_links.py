@@ -17,7 +17,7 @@ from tests.rig.words import Frame
 N_SLCAN = 17  # linux/tty.h
 TIOCSETD, SIOCGIFNAME = 0x5423, 0x8910
 CLASSIC_MTU, FD_MTU = "16", "72"
-EXTENDED = 0x8000_0000
+EXTENDED, ERROR = 0x8000_0000, 0x2000_0000
 PORTS = ("can0", "can1")
 
 
@@ -76,7 +76,9 @@ def send(interface: str, frames: Iterable[Frame], *, fd: bool = False) -> None:
         line.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
         line.bind((interface,))
         for identifier, data in frames:
-            line.send(struct.pack(form, EXTENDED | identifier, len(data), 0, data))
+            line.send(
+                struct.pack(form, identifier if identifier & ERROR else EXTENDED | identifier, len(data), 0, data)
+            )
 
 
 def slcan_text(frames: Iterable[Frame]) -> bytes:

@@ -57,7 +57,9 @@ def bulk_bridge(serial_number: str = "bulk-1") -> Iterator[BulkBridge]:
     control = os.open(MOUNT / "ep0", os.O_RDWR)
     os.write(control, _descriptors())
     os.write(control, _strings())
-    endpoint = os.open(MOUNT / "ep1", os.O_RDWR | os.O_NONBLOCK)  # an error while unplugged; it waits for readers anyway
+    endpoint = os.open(
+        MOUNT / "ep1", os.O_RDWR | os.O_NONBLOCK
+    )  # an error while unplugged; it waits for readers anyway
     gadget.plug()
     try:
         yield BulkBridge(gadget, endpoint)

@@ -1,4 +1,4 @@
-"""The kernel's CAN interfaces through the gateway's adapter: every frame, every loss, and interfaces that come and go."""
+"""The kernel's CAN interfaces through the adapter: every frame, every loss, and interfaces that come and go."""
 
 import contextlib
 from collections.abc import Iterator
@@ -11,8 +11,9 @@ from gateway.config import AdapterConfig
 from tests.rig import words
 from tests.rig.can_links import CLASSIC_MTU, PORTS, ip, linked_ports, send, slcan, slcan_text, vcan, write_line
 from tests.rig.watched import Watched, recorded_frames, wait_until
-from tests.rig.words import frames, radar_frames, radar_word
+from tests.rig.words import Frame, frames, radar_frames, radar_word
 
+BUS_OFF = Frame(0x2000_0040, bytes(8))  # as the kernel gives it of a controller
 FIFO = 4  # frames that an SJA1000 controller holds; an emulated machine may not take them out in time for more
 VCAN = "can:socketcan:vcan0"
 
@@ -148,10 +149,25 @@ def test_a_serial_can_bridge_behind_the_kernel_s_own_interface() -> None:
     assert watched.words == said(range(300))
 
 
-def test_frames_that_a_controller_has_no_room_for_are_told() -> None:
+def test_frames_that_a_controller_has_no_room_for_are_counted() -> None:
     with linked_ports(), Watched(f"can:socketcan:{PORTS[1]}") as watched:
         watched.wait_up()
-        send(PORTS[0], frames(range(3000)))  # faster than the emulated machine takes them out of its 64 bytes
-        wait_until(lambda: watched.lost, lambda: "no loss told")
-    assert watched.states.count("UP") > 1
-    assert "overflow" in watched.reasons[0]
+
+        def overflowed() -> bool:
+            send(PORTS[0], frames(range(300)))  # until the emulated machine is too slow for the controller once
+            return watched.lost > 0
+
+        wait_until(overflowed, lambda: "no overflow told")
+    assert watched.link.all_counters()["error_frames"] == watched.lost
+
+
+def test_a_controller_that_leaves_the_bus_is_told_and_its_frames_before_and_after_are_kept() -> None:
+    with vcan(), Watched(VCAN) as watched:
+        watched.wait_up()
+        send("vcan0", frames(range(5)))
+        send("vcan0", [BUS_OFF])
+        send("vcan0", frames(range(5, 10)))
+        watched.wait_words(10)
+    assert watched.words == said(range(10))
+    assert watched.states == ["OPENING", "UP", "UP", "CLOSED"]
+    assert "off the bus" in watched.reasons[0]

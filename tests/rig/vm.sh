@@ -14,14 +14,14 @@ set -euo pipefail
 PROJECT=$(realpath "$(dirname "$0")/../..")
 CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/shadebus-rig # what was downloaded and made once: kernel, modules, first root
 ROOT_SHARE="trans=virtio,version=9p2000.L,msize=262144"
-SECONDS_LEFT=300
+LIMIT_S=300
 
 die() {
   echo "vm.sh: $*" >&2
   exit 126
 }
 
-# apt-get keeps its own counsel on stdout, which belongs to the command.
+# Its standard output belongs to the command.
 apt() {
   apt-get -q -y "$@" >&2
 }
@@ -120,7 +120,7 @@ share() {
 
 while getopts t: option; do
   case $option in
-    t) SECONDS_LEFT=$OPTARG ;;
+    t) LIMIT_S=$OPTARG ;;
     *) exit 126 ;;
   esac
 done
@@ -147,7 +147,7 @@ printf 'PROJECT=%q\nKERNEL=%q\n' "$PROJECT" "$CACHE/current/kernel" >"$run/place
 } >"$run/start"
 
 # shellcheck disable=SC2046 # each share is several words
-timeout -k 5 "$SECONDS_LEFT" qemu-system-x86_64 \
+timeout -k 5 "$LIMIT_S" qemu-system-x86_64 \
   -accel tcg,thread=multi,tb-size=256 -M q35,usb=off,vmport=off -cpu max -m 1G -smp 2 \
   -nodefaults -no-user-config -display none -no-reboot -nic none \
   -kernel "$CACHE/current/vmlinuz" -initrd "$CACHE/current/initrd" \
@@ -167,6 +167,6 @@ qemu=
 [ ! -s "$run/exit_code" ] || exit "$(cat "$run/exit_code")"
 tail -n 5 "$run/kernel.log" >&2 || true
 case $ended in
-  124 | 137) echo "vm.sh: not done within $SECONDS_LEFT s" >&2; exit 124 ;;
+  124 | 137) echo "vm.sh: not done within $LIMIT_S s" >&2; exit 124 ;;
   *) echo "vm.sh: the machine ended without an exit code" >&2; exit 125 ;;
 esac

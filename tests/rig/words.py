@@ -26,7 +26,7 @@ def packet(number: int) -> bytes:
     """A RackLink packet on a stream; its number is its sequence."""
     body = b"".join(struct.pack("<II", 360_000 * entry, said) for entry, said in enumerate(words(number)))
     plain = struct.pack("<BBBBIQ", 1, WORDS_429, CHANNEL, 0, number, 20_000_000 * number) + body
-    return cobs.encode(plain + struct.pack("<I", zlib.crc32(plain))) + b"\0"
+    return bytes(cobs.encode(plain + struct.pack("<I", zlib.crc32(plain)))) + b"\0"
 
 
 class Frame(NamedTuple):
