@@ -154,6 +154,27 @@ def test_a_label_that_the_set_does_not_have_is_said_to_be_unknown() -> None:
     assert found["value"][1] == "none"
 
 
+def test_what_a_word_or_a_label_file_says_is_printed_as_it_stands(tmp_path: Path) -> None:
+    """Square brackets and colons mean something to the library that draws the tables."""
+    own = tmp_path / "own.toml"
+    row = "name = '[b]Roll[/] [deg]', encoding = 'iso5', bits = [9, 29], source = '[/p. 3]', confidence = ':x:'"
+    own.write_text(f"[own]\nequipment_id = 1\nrows = [{{ label = '356', {row} }}]\n")
+    (listed,) = rows(shadebus("labels", "--set", own).stdout)[1:]
+    assert (listed[1], listed[-2:]) == ("[b]Roll[/] [deg]", [":x:", "[/p. 3]"])
+    for said in ("[/]", "[b]", ":x:"):
+        text = sum(ord(character) << 7 * k for k, character in enumerate(said))
+        word = word429(0o356, {9: (text, 21)})
+        done = shadebus("decode", "429", f"{word:08x}", "--set", own)
+        assert {row[0]: row[3] for row in rows(done.stdout)}["value"] == "NORMAL"
+        assert {row[0]: row[2] for row in rows(done.stdout)}["value"] == repr(said)
+
+
+def test_doctor_prints_the_names_of_places_as_they_stand(tmp_path: Path) -> None:
+    place = tmp_path / "[" / ":x:]"
+    place.mkdir(parents=True)
+    assert str(place) in shadebus("doctor", "--record", place).stdout
+
+
 def test_thresholds_are_those_of_the_published_table() -> None:
     found = rows(shadebus("thresholds").stdout)
     assert found == [
