@@ -76,8 +76,8 @@ class Definition:
 
     @property
     def has_sdi(self) -> bool:
-        """Whether bits 9-10 are a source/destination identifier; in a 20-bit word they are data."""
-        return self.bits[0] > 10
+        """Whether bits 9-10 are a source/destination identifier; as part of the value or of a field they are data."""
+        return min(first for first, _ in (self.bits, *self.fields.values())) > 10
 
 
 def read_row(where: str, row: dict[str, Any]) -> Definition:

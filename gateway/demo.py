@@ -29,6 +29,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.progress import Progress, TaskID
 from rich.table import Table
+from rich.text import Text
 
 from gateway import events
 from gateway.config import profile_of
@@ -38,6 +39,7 @@ from gateway.recording import Recording
 from gateway.replay import replay
 from gateway.report import Flown, Picture, write_report
 from gateway.stopping import Stop
+from gateway.tables import plain_console
 from gateway.threads import GuardedThread
 from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Monitor, Verdict
 from monitor.scans import Scan
@@ -97,7 +99,7 @@ def fly(out: Path, seed: int, speed: float, stop: Stop) -> None:
     """
     from simulators.scenario import BUILT_IN_TERRAIN
 
-    console = Console()
+    console = plain_console()
     try:
         out.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=out).close()
@@ -236,9 +238,8 @@ def _listen(leg: Leg, gateway: "subprocess.Popen[str]", console: Console) -> Non
             if event["q"] is not None:
                 figures += f"  Q {event['q']:6.1f} against {event['threshold']:.1f}"
             why = f"  {event['reasons'][0]}" if event["verdict"] == UNAVAILABLE else ""
-            console.print(
-                f"scan {event['scan']:2d}  [{COLOURS[event['verdict']]}]{event['verdict']}[/]  {figures}{why}"
-            )
+            verdict = Text(event["verdict"], COLOURS[event["verdict"]])
+            console.print(Text.assemble(f"scan {event['scan']:2d}  ", verdict, f"  {figures}{why}"))
 
 
 def _shown(packets: Iterator[tuple[int, bytes]], leg: Leg, bar: Progress, task: TaskID) -> Iterator[tuple[int, bytes]]:
@@ -282,8 +283,9 @@ def _table(legs: list[Leg], console: Console) -> None:
             leg.title,
             *(str(count[verdict]) for verdict in (OK, ALERT, UNAVAILABLE)),
             f"{pairs[0]} to {pairs[-1]}",
-            f"[{COLOURS.get(leg.outcome, 'white')}]{leg.outcome}[/]"
-            + ("" if leg.as_expected else f", expected {leg.expected}"),
+            Text(leg.outcome, COLOURS.get(leg.outcome, "white")).append(
+                "" if leg.as_expected else f", expected {leg.expected}", "default"
+            ),
             "identical" if leg.identical else "DIFFERS",
         )
     console.print(table)

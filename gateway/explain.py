@@ -1,5 +1,6 @@
 """One bus word as rows of a table: field, bits, code, meaning."""
 
+import string
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +13,8 @@ from gateway.errors import GatewayError
 
 Row = tuple[str, ...]  # field, bits, code, meaning; of a 708 word field, bits, code, value, unit, note
 
+SIGNS = {0b00: "plus", f.SSM_BCD_MINUS: "minus"}
+SHOWN = 40  # characters of a wrong word
 SET_HEADINGS = ("set", "equipment", "labels")
 LABEL_HEADINGS = (
     "label", "name", "encoding", "bits", "range", "LSB", "units", "positive", "interval (ms)", "confidence", "source",
@@ -20,21 +23,21 @@ LABEL_HEADINGS = (
 
 def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]:
     """Rows for one ARINC 429 word in hexadecimal."""
-    word = int.from_bytes(_bytes(text.removeprefix("0x").zfill(8), (4,)), "big")
+    word = int.from_bytes(_bytes(text, (4,)), "big")
     if orientation not in f.ORIENTATIONS:
         raise GatewayError(f"orientation {orientation!r}: use one of {', '.join(f.ORIENTATIONS)}")
     definitions = _definitions(definitions_name)
     block = np.array([word], np.uint32)
     parts = arinc429.unpack(block, orientation)
     values = arinc429.decode(block, definitions, orientation)
-    label, ssm = int(parts.label[0]), int(parts.ssm[0])
+    label, sdi, ssm = int(parts.label[0]), int(parts.sdi[0]), int(parts.ssm[0])
     definition = definitions.labels.get(label)
     status = arinc429.Status(int(values.status[0]))
     name = definition.name if definition else f"not in {definitions.name}"
-    meaning = f.SSM_TABLES[definition.ssm][ssm] if definition else "depends on the label"
+    source, meaning = _meanings(ssm, definition) if definition else ("depends on the label", "depends on the label")
     rows: list[Row] = [
         ("label", "1-8", f"{label:03o}", name),
-        ("SDI", "9-10", f"{int(parts.sdi[0]):02b}", "data" if definition and not definition.has_sdi else "source"),
+        ("SDI", "9-10", f"{sdi:02b}", source),
         ("data", "11-29", f"{int(parts.data[0]):019b}", f"0x{int(parts.data[0]):05x}"),
         ("SSM", "30-31", f"{ssm:02b}", meaning),
         ("parity", "32", f"{word >> 31}", "odd, good" if parts.parity_ok[0] else "BAD: the word is damaged"),
@@ -43,11 +46,20 @@ def explain_429(text: str, definitions_name: str, orientation: str) -> list[Row]
         return [*rows, ("value", "", "none", status.name)]
     for field_name, (first, last) in definition.fields.items():
         code = int(arinc429.field(block, definition, field_name)[0])
-        rows.append((field_name, _span(first, last), f"{code:0{last - first + 1}b}", str(code)))
+        said = "not to be trusted" if status is arinc429.Status.BAD_PARITY else str(code)
+        rows.append((field_name, _span(first, last), f"{code:0{last - first + 1}b}", said))
     first, last = definition.bits
     sense = f", positive is {definition.positive}" if definition.positive else ""
     value = _value(values, block, definition)
     return [*rows, ("value", _span(first, last + (definition.encoding == "bnr")), value, status.name + sense)]
+
+
+def _meanings(ssm: int, definition: Definition) -> tuple[str, str]:
+    """What bits 9-10 are, and what the SSM says; that of a decimal value is its sign too."""
+    meaning = f.SSM_TABLES[definition.ssm][ssm]
+    if definition.encoding == definition.ssm == "bcd" and ssm in SIGNS:
+        meaning = f"{meaning}, {SIGNS[ssm]}"
+    return "source" if definition.has_sdi else "data", meaning
 
 
 def _value(values: arinc429.Values429, block: NDArray[np.uint32], definition: Definition) -> str:
@@ -184,11 +196,12 @@ def _names(names: tuple[str, ...], code: int) -> str:
 
 
 def _bytes(text: str, lengths: Sequence[int]) -> bytes:
-    try:
-        data = bytes.fromhex(text.removeprefix("0x"))
-    except ValueError as error:
-        raise GatewayError(f"{text!r} is not hexadecimal") from error
-    if len(data) not in lengths:
-        needed = lengths[0] if len(lengths) == 1 else f"{lengths[0]} to {lengths[-1]}"
-        raise GatewayError(f"{len(data)} bytes given, {needed} needed")
-    return data
+    digits = "".join(text.removeprefix("0x").removeprefix("0X").split())
+    typed = repr(text if len(text) <= SHOWN else text[:SHOWN] + "...")
+    if not set(digits) <= set(string.hexdigits):
+        raise GatewayError(f"{typed} is not hexadecimal")
+    if len(digits) % 2 or len(digits) // 2 not in lengths:
+        needed = " to ".join(str(2 * length) for length in sorted({lengths[0], lengths[-1]}))
+        mend = "a digit is missing or too many" if len(digits) % 2 else "write all of them, and spaces within quotes"
+        raise GatewayError(f"{typed}: {len(digits)} digits given, {needed} needed: {mend}")
+    return bytes.fromhex(digits)

@@ -2,12 +2,14 @@
 
 Position comes from the GNSS, whose coarse and fine words are joined only within one navigation epoch. Nothing stands in
 for it silently: an inertial position steps by 19 m and drifts, so it is kept beside, never instead. Two sources of one
-quantity are never mixed either: the first is used until it falls silent.
+quantity are never mixed either, be they two kinds of equipment or two SDIs on one bus: the first is used until it falls
+silent.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -24,6 +26,7 @@ from monitor.track import MISSING, NORMAL, STALE, Quantity, Track
 from monitor.utc import UTC_LABELS, UtcClock
 
 EPOCH_NS = 40_000_000  # a set is sent in one burst, at low speed in 35 ms
+SILENT_NS = 2_500_000_000  # of a source; nothing is interpolated over so long a gap, so another can follow it
 G_M_S2: Final = 9.80665
 SI: Final = {
     "": 1.0, "deg": 1.0, "deg/s": 1.0, "m": 1.0, "ft": FT_M, "NM": NM_M, "kt": KT_M_S, "ft/min": FT_M / 60, "g": G_M_S2,
@@ -136,12 +139,18 @@ QUANTITIES = tuple({row.quantity.name: row.quantity for row in (*SOURCES, *AXES)
 
 @dataclass
 class _Half:
-    """The coarse or fine word that still waits for the other half of its epoch."""
+    """A coarse or fine word, which waits for the other half of its epoch."""
 
     time_ns: int
     word: int
     status: int
     coarse: bool
+
+
+@cache
+def _has_sdi(definitions: Definitions) -> NDArray[np.bool_]:
+    """By label (256,), whether bits 9 and 10 of its words name their source."""
+    return np.isin(np.arange(256), [label for label, row in definitions.labels.items() if row.has_sdi])
 
 
 def _epoch_ns(definitions: Definitions, axis: Axis) -> int:
@@ -167,6 +176,7 @@ class Aircraft:
     tracks: dict[str, Track] = field(default_factory=lambda: {q.name: Track(q) for q in QUANTITIES})
     utc: UtcClock = field(default_factory=UtcClock)
     _owners: dict[str, int] = field(default_factory=dict)
+    _sources: dict[int, tuple[int, int]] = field(default_factory=dict)  # equipment -> SDI in use, when last heard
     _strange: dict[str, str] = field(default_factory=dict)
     _halves: dict[str, _Half] = field(default_factory=dict)
     _joins: Mapping[str, JoinCheck] = field(default_factory=lambda: {axis.quantity.name: JoinCheck() for axis in AXES})
@@ -181,6 +191,9 @@ class Aircraft:
     ) -> None:
         """Take one decoded block of a channel (n,): raw words, their values, and when each was true (i8, ns)."""
         equipment = definitions.equipment_id & 0xFF
+        used = self._of_one_source(definitions, time_ns, words, values)
+        time_ns, words = time_ns[used], words[used]
+        values = Values429(values.label[used], values.value[used], values.status[used])
         labels = values.label.tolist()
         for label in dict.fromkeys(labels):
             for source in SOURCES_OF.get((equipment, label), ()):
@@ -194,8 +207,36 @@ class Aircraft:
                 self.utc.feed(int(time_ns[k]), int(words[k]), values, k, definitions)
 
     def doubts(self) -> dict[str, str]:
-        """By quantity, why its words seem to be read in a wrong way: the rule that joins them, or their units."""
+        """By quantity, why its words seem to be read in a wrong way: the rule that joins them, or their units.
+
+        By source, why its words are used and not those of another.
+        """
         return self._strange | {name: doubt for name, check in self._joins.items() if (doubt := check.doubt())}
+
+    def _of_one_source(
+        self, definitions: Definitions, time_ns: NDArray[np.int64], words: NDArray[np.uint32], values: Values429
+    ) -> NDArray[np.bool_]:
+        """Which words (n,) are not of another source than the one in use: the first heard, until it falls silent.
+
+        Words to all (SDI 0), words without an SDI and damaged ones, whose SDI says nothing, are of every source.
+        """
+        named = _has_sdi(definitions)[values.label] & (values.status != Status.BAD_PARITY)
+        sdi = np.where(named, words >> np.uint32(8) & np.uint32(3), 0)
+        equipment, heard = definitions.equipment_id & 0xFF, np.flatnonzero(sdi)
+        if not heard.size:
+            return np.ones(len(words), np.bool_)
+        first, first_ns = int(sdi[heard[0]]), int(time_ns[heard[0]])
+        source, last_ns = self._sources.get(equipment, (first, first_ns))
+        if first_ns - last_ns > SILENT_NS:
+            source = first
+        own = np.flatnonzero(sdi == source)
+        self._sources[equipment] = source, int(time_ns[own[-1]]) if own.size else last_ns
+        if others := set(sdi[heard].tolist()) - {source}:
+            self._strange[f"SDI {source} of equipment {equipment:02X}"] = (
+                f"words of SDI {', '.join(map(str, sorted(others)))} are left out, as this one was heard first: "
+                "say with sdi which one the channel is to use"
+            )
+        return np.asarray((sdi == 0) | (sdi == source))
 
     def _take(
         self,
@@ -223,16 +264,19 @@ class Aircraft:
         if source.quantity is not HEIGHT or self.height_source == "076":
             self._append(source.quantity, equipment, time_ns, given, status)
         if source.quantity is ELLIPSOID_HEIGHT and self.height_source == "370":
-            undulation, known = self._undulation_m()
+            undulation, known = self._undulation_m(time_ns)
             self._append(HEIGHT, equipment, time_ns, given - undulation, np.maximum(status, known))
 
-    def _undulation_m(self) -> tuple[float, int]:
-        """Geoid over ellipsoid at the newest position, and the status of that position."""
+    def _undulation_m(self, time_ns: NDArray[np.int64]) -> tuple[float, NDArray[np.uint8]]:
+        """Geoid over ellipsoid at the newest position, and the status of that position at times i8 (n,)."""
         newest = [self.tracks[quantity.name].newest for quantity in (LATITUDE, LONGITUDE)]
         if newest[0] is None or newest[1] is None:
-            return 0.0, int(Status.NO_COMPUTED_DATA)
-        (_, latitude, one), (_, longitude, other) = newest[0], newest[1]
-        return geoid.undulation_m(latitude, longitude) if max(one, other) == NORMAL else 0.0, max(one, other)
+            return 0.0, np.full(len(time_ns), Status.NO_COMPUTED_DATA, np.uint8)
+        (one_ns, latitude, one), (other_ns, longitude, other) = newest[0], newest[1]
+        if max(one, other) != NORMAL:
+            return 0.0, np.full(len(time_ns), max(one, other), np.uint8)
+        old = time_ns - min(one_ns, other_ns) > round(LATITUDE.longest_gap_s * 1e9)
+        return geoid.undulation_m(latitude, longitude), np.where(old, STALE, NORMAL).astype(np.uint8)
 
     def _append(
         self,
@@ -253,16 +297,22 @@ class Aircraft:
 
     def _join(self, axis: Axis, equipment: int, half: _Half, rule: JoinRule, epoch_ns: int) -> None:
         other = self._halves.pop(axis.quantity.name, None)
+        if half.status != NORMAL:  # a hole by itself, as the other half may be lost
+            self._append(axis.quantity, equipment, *_sample(half.time_ns, 0.0, half.status))
+            return
         if other is None or other.coarse == half.coarse or abs(half.time_ns - other.time_ns) > epoch_ns:
             self._halves[axis.quantity.name] = half
             return
         coarse, fine = (half, other) if half.coarse else (other, half)
-        status = max(coarse.status, fine.status)
-        degrees = np.zeros(1)
-        if status == NORMAL:
-            words = np.array([coarse.word], np.uint32), np.array([fine.word], np.uint32)
-            degrees = arinc429.join_position(*words, rule)
-            if axis.quantity.name.endswith("latitude_deg") and abs(degrees[0]) > 90:
-                status = int(Status.INVALID_DATA)
-            self._joins[axis.quantity.name].feed(*words, rule)
-        self._append(axis.quantity, equipment, np.array([coarse.time_ns]), degrees, np.array([status], np.uint8))
+        words = np.array([coarse.word], np.uint32), np.array([fine.word], np.uint32)
+        degrees = float(arinc429.join_position(*words, rule)[0])
+        impossible = axis.quantity.name.endswith("latitude_deg") and abs(degrees) > 90
+        self._joins[axis.quantity.name].feed(*words, rule)
+        status = int(Status.INVALID_DATA) if impossible else NORMAL
+        self._append(axis.quantity, equipment, *_sample(coarse.time_ns, degrees, status))
+
+
+def _sample(
+    time_ns: int, value: float, status: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.uint8]]:
+    return np.array([time_ns]), np.array([value]), np.array([status], np.uint8)

@@ -2,6 +2,9 @@
 
 A sample that the bus marked as anything but normal is a hole: nothing is interpolated across it and nothing
 extrapolated from it. The same goes for a silence longer than the quantity allows.
+
+What lies beyond the samples follows their slope, and a slope over two words that came close together would be their
+noise many times over: it is taken over a fair part of `longest_gap_s`, and where there is no such pair the value holds.
 """
 
 from dataclasses import dataclass
@@ -12,6 +15,7 @@ from numpy.typing import NDArray
 
 NORMAL, STALE, MISSING = 0, 254, 255  # bus statuses of ARINC 429 words lie between
 NS = 1e-9
+SHORTEST_SLOPE = 0.05  # of longest_gap_s, so that the noise of a sample grows 20 times at most
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,7 @@ class Track:
         self._end = place.stop
 
     def at(self, time_ns: NDArray[np.int64]) -> Values:
-        """The quantity at times i8 (n,): linear between two normal samples, and shortly beyond the last two.
+        """The quantity at times i8 (n,): linear between two normal samples, and shortly beyond the first and the last.
 
         A step is what its last sample before the time said.
         """
@@ -79,16 +83,27 @@ class Track:
         span = times[after] - times[before]
         reach = np.maximum(span, np.maximum(time_ns - times[after], times[before] - time_ns))
         status = np.maximum(statuses[before], statuses[after])
+        back, forth = self._lever(times[-1] - times[::-1], statuses[::-1]), self._lever(times - times[0], statuses)
+        before = np.where(time_ns > times[-1], self._end - 1 - back, before)
+        after = np.where(time_ns < times[0], forth, after)
+        span = times[after] - times[before]
         status[(reach > round(self.quantity.longest_gap_s / NS)) & (status == NORMAL)] = STALE
         step = values[after] - values[before]
         if self.quantity.angle:
             step = wrap(step)
-        # Two samples of one instant have no slope: the later one stands.
+        # Without a slope the value holds; of two samples of one instant the later one stands.
         fraction = np.where(span > 0, (time_ns - times[before]) / np.maximum(span, 1), 1.0)
         value = values[before] + step * fraction
         if self.quantity.angle:
             value = wrap(value)
         return Values(np.where(status == NORMAL, value, 0.0), status)
+
+    def _lever(self, distance_ns: NDArray[np.int64], status: NDArray[np.uint8]) -> int:
+        """How many samples from the end of the track, nearest first, its slope is taken over; 0 if there is none."""
+        longest = self.quantity.longest_gap_s / NS
+        far = int(np.searchsorted(distance_ns, SHORTEST_SLOPE * longest))
+        near_enough = far < len(distance_ns) and distance_ns[far] <= longest
+        return far if near_enough and not status[: far + 1].any() else 0
 
     def _held(self, time_ns: NDArray[np.int64]) -> Values:
         if not self._end:

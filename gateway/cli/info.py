@@ -14,7 +14,6 @@ def info(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
     from gateway.stopping import Stop
 
     stop = Stop()  # before the imports that take their time
-    from rich.console import Console
     from rich.table import Column, Table
 
     from gateway.console import clock
@@ -22,6 +21,7 @@ def info(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
     from gateway.pipeline import Pipeline
     from gateway.recording import Recording
     from gateway.records import Raw
+    from gateway.tables import plain_console
 
     source = Recording(recording)
     config = recorded_config(source.metadata)
@@ -49,4 +49,4 @@ def info(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
         for name, count in getattr(event, "counters", {}).items():
             if count:
                 table.add_row(name, str(count))
-    Console().print(table)
+    plain_console().print(table)

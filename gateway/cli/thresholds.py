@@ -12,10 +12,10 @@ def thresholds(
     p_md: Annotated[float | None, typer.Option(min=1e-12, max=0.999, help="probability of missed detection")] = None,
 ) -> None:
     """Print T_D and the minimum detectable bias; without options, the six configurations of the paper's Table 2."""
-    from rich.console import Console
     from rich.table import Table
 
     from gateway.errors import GatewayError
+    from gateway.tables import plain_console
     from monitor.disparity import minimum_detectable_bias, threshold
 
     given = (n, sigma_c, p_fa, p_md)
@@ -32,4 +32,4 @@ def thresholds(
         bias = minimum_detectable_bias(count, sigma * 2**0.5, alarm, missed)
         limit = threshold(count, alarm)
         table.add_row(f"{count}", f"{sigma:g}", f"{alarm:.0e}", f"{missed:.0e}", f"{limit:.2f}", f"{bias:.2f}")
-    Console().print(table)
+    plain_console().print(table)

@@ -7,7 +7,7 @@ from subprocess import run
 
 import pytest
 
-from decoders.definitions import DefinitionError, for_equipment, load_definitions
+from decoders.definitions import DefinitionError, for_equipment, load_definitions, parse_definitions
 
 BASE = "name = 'n', source = 's', confidence = 'c'"
 ANGLE = "encoding = 'bnr', bits = [14, 28], range = 180, lsb = '180/2^15', units = 'deg'"
@@ -169,6 +169,14 @@ def test_equipment_is_looked_up_by_the_low_byte_of_its_id(equipment_id: int, nam
 def test_bits_9_and_10_are_data_in_the_20_bit_words_and_in_no_other(name: str, twenty_bit: set[int]) -> None:
     labels = load_definitions(name).labels
     assert {label for label, row in labels.items() if not row.has_sdi} == twenty_bit
+
+
+def test_a_field_at_bits_9_or_10_makes_them_data(tmp_path: Path) -> None:
+    for bit, has_sdi in ((9, False), (10, False), (11, True)):
+        text = (
+            f"[a]\nequipment_id = 1\nrows = [{{ {BASE}, label = '270', encoding = 'disc', fields = {{ x = {bit} }} }}]"
+        )
+        assert parse_definitions(text, tmp_path).labels[0o270].has_sdi is has_sdi
 
 
 def test_the_label_table_is_read_without_numba() -> None:

@@ -132,7 +132,7 @@ def test_a_mistake_in_a_profile_of_ones_own_is_one_line(tmp_path: Path) -> None:
 
 def test_arinc_429_words_are_explained_field_by_field() -> None:
     good, bad = arinc429.encode(0o324, -2.5), arinc429.encode(0o324, -2.5) ^ 1 << 31
-    done = shadebus("decode", "429", f"{good:08x}", f"0x{bad:08X}")
+    done = shadebus("decode", "429", f"{good:08x}", f"0X{bad:08X}")
     assert done.returncode == 0
     found = [row for row in rows(done.stdout) if row[0] != "field"]
     names = [row[0] for row in found]
@@ -150,9 +150,31 @@ def test_arinc_429_words_are_explained_field_by_field() -> None:
 
 
 def test_a_label_that_the_set_does_not_have_is_said_to_be_unknown() -> None:
-    found = {row[0]: row[1:] for row in rows(shadebus("decode", "429", "0", "--set", "ra_707").stdout)}
+    found = {row[0]: row[1:] for row in rows(shadebus("decode", "429", "00 00 00 00", "--set", "ra_707").stdout)}
     assert found["label"][2] == "not in ra_707"
+    assert found["SDI"][2] == found["SSM"][2] == "depends on the label"
     assert found["value"][1] == "none"
+
+
+def test_what_a_word_or_a_label_file_says_is_printed_as_it_stands(tmp_path: Path) -> None:
+    """Square brackets and colons mean something to the library that draws the tables."""
+    own = tmp_path / "own.toml"
+    row = "name = '[b]Roll[/] [deg]', encoding = 'iso5', bits = [9, 29], source = '[/p. 3]', confidence = ':x:'"
+    own.write_text(f"[own]\nequipment_id = 1\nrows = [{{ label = '356', {row} }}]\n")
+    (listed,) = rows(shadebus("labels", "--set", own).stdout)[1:]
+    assert (listed[1], listed[-2:]) == ("[b]Roll[/] [deg]", [":x:", "[/p. 3]"])
+    for said in ("[/]", "[b]", ":x:"):
+        text = sum(ord(character) << 7 * k for k, character in enumerate(said))
+        word = word429(0o356, {9: (text, 21)})
+        done = shadebus("decode", "429", f"{word:08x}", "--set", own)
+        assert {row[0]: row[3] for row in rows(done.stdout)}["value"] == "NORMAL"
+        assert {row[0]: row[2] for row in rows(done.stdout)}["value"] == repr(said)
+
+
+def test_doctor_prints_the_names_of_places_as_they_stand(tmp_path: Path) -> None:
+    place = tmp_path / "[" / ":x:]"
+    place.mkdir(parents=True)
+    assert str(place) in shadebus("doctor", "--record", place).stdout
 
 
 def test_thresholds_are_those_of_the_published_table() -> None:
@@ -228,3 +250,13 @@ def test_the_discrete_bits_of_a_word_are_explained_beside_its_value() -> None:
     found = {row[0]: row[1:] for row in rows(shadebus("decode", "429", f"{word:08x}", "--set", "gnss_743a").stdout)}
     assert found["satellite_failure"] == ["11", "1", "1"]
     assert found["value"] == ["12-28", "1 NM", "NORMAL"]
+    damaged = rows(shadebus("decode", "429", f"{word ^ 1 << 31:08x}", "--set", "gnss_743a").stdout)
+    assert {row[0]: row[3] for row in damaged}["satellite_failure"] == "not to be trusted"
+
+
+@pytest.mark.parametrize(("ssm", "sign", "value"), [(0, "plus", "20.5 ft"), (3, "minus", "-20.5 ft")])
+def test_the_matrix_of_a_decimal_word_is_its_sign(ssm: int, sign: str, value: str) -> None:
+    word = word429(0o165, {11: (0x0205, 19)}, ssm)
+    found = {row[0]: row[1:] for row in rows(shadebus("decode", "429", f"{word:08x}", "--set", "ra_707").stdout)}
+    assert found["SSM"][2] == f"NORMAL, {sign}"
+    assert found["value"][1] == value

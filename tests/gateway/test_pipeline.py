@@ -314,11 +314,12 @@ def test_a_position_joined_by_the_wrong_rule_is_told_and_degrades_the_next_verdi
 def test_the_state_tells_utc_as_the_receiver_has_it() -> None:
     bridge, pipeline = Bridge(), Pipeline(RACK, None)
     date = word429(0o260, {24: (1, 4), 19: (6, 4), 15: (2, 4), 11: (6, 4)})
-    time = word429(0o150, {24: (12, 5), 11: (1, 1)}, ssm=3)
-    (state,) = only(
-        StateEvent, feed(pipeline, raw(1, 0, bridge.hello() + bridge.words(GNSS, 5, [date, time])), tick(2, 2.0))
-    )
-    assert state.values["utc_s"] == datetime(2026, 6, 1, 12, 0, 2, tzinfo=UTC).timestamp()
+    stream = bridge.hello()
+    for second in range(2):
+        time = word429(0o150, {24: (12, 5), 12: (second, 6), 11: (1, 1)}, ssm=3)
+        stream += bridge.words(GNSS, 5 + second, [date, time])
+    (state,) = only(StateEvent, feed(pipeline, raw(1, 0, stream), tick(2, 2.0)))
+    assert state.values["utc_s"] == datetime(2026, 6, 1, 12, 0, 3, tzinfo=UTC).timestamp()
     assert state.validity["utc_s"] == "NORMAL"
 
 

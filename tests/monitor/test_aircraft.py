@@ -17,7 +17,7 @@ SETS = {
 }  # fmt: skip
 MS = 1_000_000
 NORMAL_SSM, NO_COMPUTED_DATA_SSM = 3, 1
-NO_COMPUTED_DATA = 1
+NO_COMPUTED_DATA, BAD_PARITY = 1, 4
 FINE_STEP_DEG = 180 / 2**31
 
 
@@ -94,6 +94,57 @@ def test_no_computed_data_on_either_half_is_a_hole(coarse_ssm: int, fine_ssm: in
         coarse, fine = coarse_and_fine(0o110, 45.0, *ssms)
         feed(aircraft, GNSS, [(time, coarse), (time + 2, fine)])
     assert latitudes(aircraft, 100, 300, 500) == ([0, 0, 45.0], [NO_COMPUTED_DATA, NO_COMPUTED_DATA, 0])
+
+
+@pytest.mark.parametrize(("half", "ssm", "status"), [(0, 1, NO_COMPUTED_DATA), (1, 1, NO_COMPUTED_DATA), (0, 0, 3)])
+def test_an_invalid_half_is_a_hole_at_its_time_though_its_other_half_is_lost(half: int, ssm: int, status: int) -> None:
+    """From 1000 ms on one epoch, or every one, has an invalid half alone."""
+    for ends in (1001, 3000):
+        aircraft = Aircraft()
+        for time in range(0, 3000, 200):
+            words = coarse_and_fine(0o110, 45.0, ssm if half == 0 else 3, ssm if half == 1 else 3)
+            good = coarse_and_fine(0o110, 45.0)
+            invalid = 1000 <= time < ends
+            feed(aircraft, GNSS, [(time, words[half])] if invalid else [(time, good[0]), (time + 2, good[1])])
+        assert latitudes(aircraft, 700, 900, 1100)[1] == [0, status, status]
+        assert latitudes(aircraft, 2900)[1] == [status if ends == 3000 else 0]
+
+
+def pitch(sdi: int, steps: int, **damage: bool) -> int:
+    return word429(0o324, {9: (sdi, 2), 15: (steps, 15)}, ssm=NORMAL_SSM, **damage)
+
+
+def test_of_two_sources_on_one_bus_the_first_is_used_until_it_falls_silent() -> None:
+    """SDI 1 and 2 send a pitch 0.36 ms apart; words to all count for either."""
+    aircraft, step = Aircraft(), 180 / 2**14
+    for time in range(0, 400, 20):
+        feed(aircraft, IRU, [(time, pitch(1, 182)), (time + 1, pitch(2, 191)), (time + 2, pitch(0, 182))])
+    found = aircraft.tracks["pitch_deg"].at(np.array([381, 390, 500, 630]) * MS)
+    assert (found.status.tolist(), found.value.tolist()) == ([0] * 4, [pytest.approx(182 * step)] * 4)
+    ((about, doubt),) = aircraft.doubts().items()
+    assert about == "SDI 1 of equipment 04"
+    assert "words of SDI 2 are left out" in doubt
+    for time in (2800, 2890, 2910):  # 2.5 s after the last of SDI 1
+        feed(aircraft, IRU, [(time, pitch(2, 191))])
+    assert aircraft.tracks["pitch_deg"].at(np.array([2900 * MS])).value.tolist() == [pytest.approx(191 * step)]
+    feed(aircraft, IRU, [(2920, pitch(1, 182)), (2930, pitch(2, 191))])
+    assert aircraft.tracks["pitch_deg"].at(np.array([2920 * MS])).value.tolist() == [pytest.approx(191 * step)]
+    assert [*aircraft.doubts()] == ["SDI 1 of equipment 04", "SDI 2 of equipment 04"]
+
+
+def test_a_damaged_word_chooses_no_source_and_is_a_hole() -> None:
+    aircraft = Aircraft()
+    feed(aircraft, IRU, [(0, pitch(2, 191, odd=False)), (20, pitch(1, 182)), (40, pitch(3, 182, odd=False))])
+    assert aircraft.doubts() == {}
+    assert aircraft.tracks["pitch_deg"].at(np.array([40 * MS])).status.tolist() == [BAD_PARITY]
+
+
+def test_words_without_a_source_are_of_every_source() -> None:
+    """Bits 9 and 10 of a latitude are its last digits."""
+    aircraft = Aircraft()
+    feed(aircraft, IRU, [(t, word429(0o310, {9: (2**18 + t, 21)}, ssm=NORMAL_SSM)) for t in range(4)])
+    assert aircraft.doubts() == {}
+    assert aircraft.tracks["inertial_latitude_deg"].newest == (3 * MS, (2**18 + 3) * 180 / 2**20, 0)
 
 
 def test_labels_of_other_equipment_give_nothing() -> None:
@@ -211,3 +262,13 @@ def test_a_height_over_the_ellipsoid_without_a_position_is_no_height() -> None:
     aircraft = Aircraft(height_source="370")
     feed(aircraft, GNSS, [(t, word429(0o370, {9: (8 * 2500, 21)}, ssm=NORMAL_SSM)) for t in (0, 200)])
     assert aircraft.tracks["height_m"].at(np.array([100 * MS])).status.tolist() == [NO_COMPUTED_DATA]
+
+
+def test_a_height_over_the_ellipsoid_is_no_height_once_the_position_is_old() -> None:
+    aircraft = Aircraft(height_source="370")
+    for label, degrees in ((0o110, 44.37514), (0o111, -71.71874)):
+        words = coarse_and_fine(label, degrees)
+        feed(aircraft, GNSS, [(0, words[0]), (2, words[1])])
+    feed(aircraft, GNSS, [(t, word429(0o370, {9: (8 * 2500, 21)}, ssm=NORMAL_SSM)) for t in (2300, 2500, 2501, 2700)])
+    found = aircraft.tracks["height_m"].at(np.array([2400, 2600]) * MS)
+    assert found.status.tolist() == [0, STALE]

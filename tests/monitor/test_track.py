@@ -90,9 +90,31 @@ def test_before_two_samples_everything_is_missing() -> None:
 
 
 def test_of_two_samples_of_one_instant_the_later_stands() -> None:
-    """No slope can be had from them, and none is made up beyond them."""
+    """No slope can be had from them: what lies beyond takes it from the sample before."""
     track = feed(Track(SPEED), [0, 100, 100], [0, 1, 2])
-    assert at(track, 50, 150).value.tolist() == [0.5, 2]
+    assert at(track, 50, 150).value.tolist() == [0.5, 3]
+
+
+def test_a_slope_is_never_taken_over_two_samples_that_came_close_together() -> None:
+    """SPEED may be silent for 1 s, so 50 ms and more are fair: these lie 0.01 ms apart, and 1 unit."""
+    times, values = np.array([0, 500_000, 500_010]) * 1000, np.array([0.0, 10, 11])
+    track = Track(SPEED)
+    track.append(times, values, np.zeros(3, np.uint8))
+    assert at(track, 1000).value.tolist() == pytest.approx([22], abs=1e-3)
+    before = Track(SPEED)
+    before.append(-times[::-1], values[::-1], np.zeros(3, np.uint8))
+    assert at(before, -1000).value.tolist() == pytest.approx([22], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("times_ms", "statuses"),
+    [([100, 101], [0, 0]), ([0, 90, 100, 101], [0, NO_COMPUTED_DATA, 0, 0]), ([-5000, 100, 101], [0, 0, 0])],
+)
+def test_without_a_slope_the_value_holds(times_ms: list[int], statuses: list[int]) -> None:
+    """There is nothing else, or only something across a hole or a silence."""
+    track = feed(Track(SPEED), times_ms, [0.0] * (len(times_ms) - 2) + [5.0, 6.0], statuses)
+    found = at(track, 600)
+    assert (found.value.tolist(), found.status.tolist()) == ([6], [NORMAL])
 
 
 @pytest.mark.parametrize("block", [1, 3, 7, 8, 50])

@@ -70,9 +70,68 @@ def test_three_quarters_of_a_second_are_added_and_never_taken_away() -> None:
 
 
 def test_without_fractions_the_time_of_day_is_enough() -> None:
+    """That there are none is known once a second time of day has come."""
     clock, moment = UtcClock(), datetime(2026, 6, 1, 7, 8, 9, tzinfo=UTC)
     feed(clock, 0, whole(moment)[:2])
+    assert clock.at(1 * MS) == (None, "MISSING")
+    feed(clock, 1000, whole(moment + timedelta(seconds=1))[:2])
     assert clock.at(1 * MS) == (utc_ns(moment), "NORMAL")
+
+
+@pytest.mark.parametrize("order", list(permutations(range(4))))
+@pytest.mark.parametrize("lost", [[], [2], [3], [2, 3]])
+def test_no_set_is_whole_without_the_fractions_that_the_receiver_gives(order: tuple[int, ...], lost: list[int]) -> None:
+    """One is damaged, or says it is not to be used: until the next whole set UTC runs on from the one before."""
+    clock, first = UtcClock(), datetime(2026, 6, 1, 12, 34, 56, 250_000, UTC)
+    for number in range(2):
+        feed(clock, 200 * number, whole(first + timedelta(milliseconds=200 * number)))
+    ahead_ns = utc_ns(first) - 1 * MS  # in a set of the order of whole() the time of day is sent after a millisecond
+    words = whole(first + timedelta(milliseconds=750 - 1))
+    sent_ms = 750 - order.index(1)
+    for k, which in enumerate(order):
+        for damage in (1 << 31, 0b11 << 29) if which in lost else (0,):
+            feed(clock, sent_ms + k, [words[which] ^ damage])
+            at = clock.at((sent_ms + k) * MS)
+            assert at.validity == "NORMAL"
+            assert at.utc_ns is not None
+            assert abs(at.utc_ns - ahead_ns - (sent_ms + k) * MS) <= 1 * MS
+    assert (clock.at(2800 * MS).validity == "STALE") == bool(lost)
+
+
+@pytest.mark.parametrize(("ssm", "status"), [(0, "FAILURE_WARNING"), (1, "NO_COMPUTED_DATA"), (2, "FUNCTIONAL_TEST")])
+def test_a_time_of_day_that_is_not_normal_ends_what_was_known_until_the_next_set(ssm: int, status: str) -> None:
+    clock, moment = UtcClock(), datetime(2026, 6, 1, 12, 0, 0, 250_000, UTC)
+    feed(clock, 0, whole(moment))
+    feed(clock, 200, [whole(moment)[0], time(12, 0, 0, ssm=ssm), *whole(moment)[2:]])
+    assert clock.at(201 * MS) == (None, status)
+    feed(clock, 400, whole(moment + timedelta(milliseconds=400)))
+    assert clock.at(401 * MS).validity == "NORMAL"
+
+
+def test_a_date_that_is_not_normal_ends_what_was_known() -> None:
+    clock, moment = UtcClock(), datetime(2026, 6, 1, 12, 0, 0, 250_000, UTC)
+    feed(clock, 0, whole(moment))
+    feed(clock, 200, [date(moment) ^ 1 << 29 ^ 1 << 31, *whole(moment + timedelta(milliseconds=200))[1:]])
+    assert clock.at(210 * MS) == (None, "NO_COMPUTED_DATA")
+
+
+def test_another_receiver_may_give_no_fractions() -> None:
+    clock, moment = UtcClock(), datetime(2026, 6, 1, 12, 0, 0, 250_000, UTC)
+    feed(clock, 0, whole(moment))
+    for second in (10, 11):
+        feed(clock, 1000 * second, whole(moment + timedelta(seconds=second))[:2])
+    assert clock.at(11_001 * MS) == (utc_ns(moment.replace(second=11, microsecond=0)), "NORMAL")
+
+
+def test_a_day_that_began_wrong_is_right_once_the_date_is() -> None:
+    """The first set comes after midnight, with a date that is still to roll over."""
+    clock, midnight = UtcClock(), datetime(2026, 7, 1, tzinfo=UTC)
+    for second in range(1, 12):
+        moment = midnight + timedelta(seconds=second, milliseconds=250)
+        late = 1 if second < 4 else 0
+        feed(clock, 1000 * second, [date(moment - timedelta(days=late)), *whole(moment)[1:]])
+        at = clock.at((1000 * second + 1) * MS)
+        assert at.utc_ns == utc_ns(moment - timedelta(days=late))
 
 
 @pytest.mark.parametrize("rolls_late", [0, 1, 2])
@@ -93,6 +152,7 @@ def test_a_leap_second_is_the_second_before_midnight_counted_twice() -> None:
     clock, day = UtcClock(), datetime(2016, 12, 31, tzinfo=UTC)
     midnight = utc_ns(day + timedelta(days=1))
     seen = []
+    feed(clock, -1000, [date(day), time(23, 59, 58)])
     for second, words in enumerate(
         ([date(day), time(23, 59, 59)], [date(day), time(23, 59, 60)], [date(day + timedelta(days=1)), time(0, 0, 0)])
     ):
@@ -111,7 +171,8 @@ def test_the_years_are_those_of_this_century() -> None:
 
 def test_a_receiver_that_is_not_precise_yet_says_so() -> None:
     clock, moment = UtcClock(), datetime(2026, 6, 1, tzinfo=UTC)
-    feed(clock, 0, [date(moment), time(0, 0, 0, precise=False)])
+    feed(clock, 0, whole(moment))
+    feed(clock, 0, [date(moment), time(0, 0, 0, precise=False), *whole(moment)[2:]])
     assert clock.at(1 * MS) == (utc_ns(moment), "NOT_PRECISE")
 
 
@@ -136,7 +197,7 @@ def test_nothing_is_known_before_a_set_and_nothing_new_from_words_that_are_not_n
 def test_utc_runs_on_for_two_seconds_and_a_half_and_is_stale_then(silent_ms: int, validity: str) -> None:
     clock, moment = UtcClock(), datetime(2026, 6, 1, 12, 0, 0, tzinfo=UTC)
     feed(clock, 0, whole(moment))
-    feed(clock, silent_ms - 10, [time(12, 0, 0, ssm=1)])
+    feed(clock, silent_ms - 10, whole(moment)[2:])
     assert clock.at(silent_ms * MS).validity == validity
 
 
