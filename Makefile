@@ -45,6 +45,10 @@ load: $(READY)
 full-load: $(READY)
 	$(BIN)/python -m benchmarks.full_load
 
+# A quarter of an hour of faults on every kind of line at once: nothing may grow, nothing may be lost uncounted.
+soak: $(READY)
+	$(BIN)/python -m benchmarks.soak
+
 # The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
 calibration: $(READY)
 	$(BIN)/python -m benchmarks.calibrate_demo

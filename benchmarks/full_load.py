@@ -112,7 +112,7 @@ class Sender:
                 if radials % SWEEP == 1 and radials > 1:  # the first of a sweep ends the one before
                     self.scan_ended_s.append(time.monotonic())
             elif kind == f.HEARTBEAT and ready_ns > SETTLED_S * 1e9:
-                self.costs.append(Costs(time.monotonic(), time.process_time() - time.thread_time(), _memory()))
+                self.costs.append(Costs(time.monotonic(), time.process_time() - time.thread_time(), memory()))
 
 
 def run(name: str, seconds: float) -> dict[str, float]:
@@ -214,7 +214,8 @@ def _rack(source: str, directory: Path) -> RackConfig:
     )
 
 
-def _memory() -> int:
+def memory() -> int:
+    """Bytes that this process holds."""
     resident = Path("/proc/self/status").read_text().partition("VmRSS:")[2].split()[0]
     return 1024 * int(resident)
 
