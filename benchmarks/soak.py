@@ -190,7 +190,7 @@ def _uncounted(speakers: list[Speaker], counters: dict[str, int]) -> Iterator[st
             books = [counters[f"{speaker.name}.channel_{channel}.words{where}"] for where in WHERE]
             arrived, lost = arrived + books[0], lost + books[1] + books[2]
             if sum(books) != carried:
-                yield f"{speaker.name} channel {channel}: {carried} words sent; arrived, lost on link, in bridge: {books}"
+                yield f"{speaker.name} channel {channel}: {carried} sent; arrived, lost on link, in bridge: {books}"
         print(f"{speaker.name}: {arrived} words arrived, {lost} counted as lost")
 
 
