@@ -9,7 +9,7 @@ from decoders import formats as f
 from decoders.racklink import MalformedBody, Packet, hello, radar_word, words429
 from gateway.config import RackConfig, profile_of
 from gateway.console import clock
-from gateway.link import FLAG_NAMES, SPOILT, Channel429, Channel708, Link
+from gateway.link import FLAG_NAMES, SPOILT, Channel429, Link
 from gateway.records import Raw, Record
 
 
@@ -53,10 +53,10 @@ def _words(link: Link, packet: Packet) -> Iterator[str]:
 
 def _radar(link: Link, packet: Packet) -> str:
     word = radar_word(packet)
-    channel = link.channels.get(packet.channel)
+    channel = link.radar(packet.channel)
     text = f"{word.data[: f.HEADER_708_BYTES].hex()}...  "
     readable = word.bit_count >= 8 * f.HEADER_708_BYTES and not packet.flags & SPOILT & ~f.FLAG_WORD_LENGTH
-    if not isinstance(channel, Channel708) or not readable:
+    if not channel or not readable:
         return f"{text}{word.bit_count} bits, not decoded"
     array, profile = np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile
     if word.bit_count == profile.word_bits:
