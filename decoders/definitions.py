@@ -4,7 +4,7 @@ A label means different things on different equipment, so definitions come in na
 Nothing here packs or unpacks a word: decoders and simulators read the same rows and share no more than them.
 """
 
-import re
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from decoders.definition_rows import Definition, DefinitionError, check_fine, read_row
+from decoders.definition_rows import Definition, DefinitionError, check_fine, check_position, read_row
+from decoders.toml_places import place
 
 __all__ = [
     "Definition",
@@ -37,8 +38,6 @@ SET_OF_EQUIPMENT: Final = {
     0x31: "clock_731",
     0x38: "adiru_738",
 }
-COMMENT_OR_TEXT: Final = re.compile(r"""'[^']*'|"(?:[^"\\]|\\.)*"|#.*""")
-HEADER: Final = re.compile(r"\[\[?([\w.-]+)\]\]?")
 SET_KEYS: Final = frozenset({"equipment_id", "extends", "rows"})
 
 
@@ -90,27 +89,10 @@ class _File(NamedTuple):
     tables: dict[str, Any]
     text: str
 
-    def where(self, name: str, label: object, row: int) -> str:
-        """File and line of a set's row, counted from 0, as editors take it, its set and its label."""
-        lines = _row_lines(self.text, name)
-        line = f":{lines[row]}" if row < len(lines) else ""
-        return f"{self.path}{line} [{name}] label {label}"
-
-
-def _row_lines(text: str, name: str) -> list[int]:
-    """The lines on which the rows of a set begin: its inline tables, or its headers [[name.rows]]."""
-    lines, inside, depth = [], False, 0
-    for number, line in enumerate(text.splitlines(), 1):
-        bare = COMMENT_OR_TEXT.sub("", line)
-        header = HEADER.fullmatch(bare.strip()) if not depth else None
-        if header:
-            inside = header[1] == name
-            if header[1] == f"{name}.rows":
-                lines.append(number)
-        for mark in bare if inside and not header else "":
-            lines += [number] if mark == "{" and depth == 1 else []
-            depth += (mark in "[{") - (mark in "]}")
-    return lines
+    def refusal(self, why: object, name: str, *keys: str | int, label: object = None) -> DefinitionError:
+        """An error that begins with the file and line of what is at `keys` of a set, the set and the label, if any."""
+        about = f"[{name}]" if label is None else f"[{name}] label {label}"
+        return DefinitionError(f"{place(self.path, self.text, name, *keys)} {about}: {why}")
 
 
 @cache
@@ -121,8 +103,8 @@ def _built_in() -> _File:
         for k, row in enumerate([] if "extends" in table else table["rows"]):
             other = defined.setdefault((table["equipment_id"], row["label"]), name)
             if other != name:
-                where = file.where(name, row["label"], k)
-                raise DefinitionError(f"{where}: set {other} defines it for the same equipment: extend that set")
+                why = f"set {other} defines it for the same equipment: extend that set"
+                raise file.refusal(why, name, "rows", k, label=row["label"])
     return file
 
 
@@ -141,39 +123,47 @@ def _text(path: Path) -> str:
 
 
 def _file(text: str, path: Path) -> _File:
-    # Decimal fractions are kept exact: 0.1 and 4.096 have no exact float.
     try:
-        return _File(path, tomllib.loads(text, parse_float=Fraction), text)
-    except ValueError as error:  # no TOML, or a number that is none
+        return _File(path, tomllib.loads(text, parse_float=_exact), text)
+    except ValueError as error:
         raise DefinitionError(f"{path} is no TOML: {error}") from error
+
+
+def _exact(number: str) -> Fraction | float:
+    """Decimal fractions are kept exact: 0.1 and 4.096 have no exact float. nan and inf are refused with their row."""
+    return Fraction(number) if math.isfinite(float(number)) else float(number)
 
 
 def _set(file: _File, name: str) -> Definitions:
     table = file.tables[name]
     if not isinstance(table, dict) or not {"equipment_id", "rows"} <= table.keys() <= SET_KEYS:
-        raise DefinitionError(f"{file.path} [{name}]: a set has equipment_id, rows and perhaps extends, nothing else")
-    if type(table["equipment_id"]) is not int or not 0 <= table["equipment_id"] <= 0xFFF:
-        raise DefinitionError(
-            f"{file.path} [{name}]: equipment_id is a number from 0x000 to 0xFFF, as label 377 has it"
-        )
+        raise file.refusal("a set has equipment_id, rows and perhaps extends, nothing else", name)
+    equipment_id, base = table["equipment_id"], table.get("extends")
+    if type(equipment_id) is not int or not 0 <= equipment_id <= 0xFFF:
+        raise file.refusal("equipment_id is a number from 0x000 to 0xFFF, as label 377 has it", name, "equipment_id")
     if not isinstance(table["rows"], list):
-        raise DefinitionError(f"{file.path} [{name}]: rows is a list of {{ label = ..., name = ..., ... }}")
+        raise file.refusal("rows is a list of { label = ..., name = ..., ... }", name, "rows")
+    if base is not None and base not in set_names():
+        raise file.refusal(f"extends is {base!r}: name one of {', '.join(set_names())}", name, "extends")
     labels: dict[int, Definition] = {}
+    rows: dict[int | None, tuple[str, int]] = {}  # by label, where it is defined
     for k, row in enumerate(table["rows"]):
-        if not isinstance(row, dict):
-            raise DefinitionError(f"{file.path} [{name}]: {row!r} is no row; write {{ label = ..., name = ..., ... }}")
-        where = file.where(name, row.get("label", "?"), k)
-        definition = read_row(where, row)
+        label = row.get("label", "?") if isinstance(row, dict) else "?"
+        try:
+            definition = read_row(row)
+        except DefinitionError as error:
+            raise file.refusal(error, name, "rows", k, label=label) from error
         if definition.label in labels:
-            raise DefinitionError(f"{where}: defined twice")
-        labels[definition.label] = definition
-    try:
-        inherited = _named(table["extends"]).labels if "extends" in table else {}
-    except ValueError as error:
-        raise DefinitionError(f"{file.path} [{name}] extends: {error}") from error
-    if not inherited and not labels:
-        raise DefinitionError(f"{file.path} [{name}]: a set has at least one row")
-    whole = {**inherited, **labels}
-    for definition in whole.values():
-        check_fine(f"{file.path} [{name}] label {definition.label:03o}", definition, whole)
-    return Definitions(name, table["equipment_id"], whole)
+            raise file.refusal("defined twice", name, "rows", k, label=label)
+        labels[definition.label], rows[definition.label] = definition, ("rows", k)
+    whole = {**(_named(base).labels if base is not None else {}), **labels}
+    if not whole:
+        raise file.refusal("a set has at least one row", name, "rows")
+    for label, definition in whole.items():
+        try:
+            check_position(definition, equipment_id)
+            check_fine(definition, whole)
+        except DefinitionError as error:  # of a row of the file, or of an inherited one that is no remainder any more
+            keys = rows.get(label) or rows.get(definition.fine_of) or ()
+            raise file.refusal(error, name, *keys, label=f"{label:03o}") from error
+    return Definitions(name, equipment_id, whole)

@@ -1,7 +1,6 @@
 """Radar profiles: what differs between radars that speak ARINC 708, read from TOML and checked."""
 
 import tomllib
-from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -11,6 +10,7 @@ from pydantic import ConfigDict, Field, ValidationError, model_validator
 from pydantic.dataclasses import dataclass
 
 from decoders.formats import HEADER_708_BYTES, LONGEST_WORD_708_BITS
+from decoders.toml_places import place
 
 HEADER_BITS: Final = 8 * HEADER_708_BYTES
 PROFILES_FILE: Final = Path(__file__).with_name("profiles.toml")
@@ -22,7 +22,7 @@ Colour = Annotated[str, Field(pattern=r"^#[0-9a-f]{6}$")]
 
 
 class ProfileError(ValueError):
-    """A profile that no radar can have; the message names the file, the profile and the key."""
+    """A profile that no radar can have; the message names the file, the line, the profile and the key."""
 
 
 @dataclass(frozen=True, slots=True, config=ConfigDict(extra="forbid"))
@@ -94,14 +94,15 @@ def parse_profile(text: str, path: Path) -> Profile:
     if len(tables) != 1:
         raise ProfileError(f"{path} has {len(tables)} tables: put exactly one profile in a file")
     ((name, table),) = tables.items()
-    return _profile(path, name, table)
+    return _profile(path, text, name, table)
 
 
 def _named(name: str) -> Profile:
-    tables = _tables(_text(PROFILES_FILE), PROFILES_FILE)
+    text = _text(PROFILES_FILE)
+    tables = _tables(text, PROFILES_FILE)
     if name not in tables:
         raise ValueError(f"no profile {name!r}: use one of {', '.join(tables)}, or a .toml file")
-    return _profile(PROFILES_FILE, name, tables[name])
+    return _profile(PROFILES_FILE, text, name, tables[name])
 
 
 def _text(path: Path) -> str:
@@ -118,31 +119,27 @@ def _tables(text: str, path: Path) -> dict[str, Any]:
         raise ProfileError(f"{path} is no TOML: {error}") from error
 
 
-def _profile(path: Path, name: str, table: object) -> Profile:
-    where = f"{path} [{name}]"
+def _profile(path: Path, text: str, name: str, table: object) -> Profile:
+    def where(*keys: str | int) -> str:
+        return " ".join((f"{place(path, text, name, *keys)} [{name}]", *map(str, keys)))
+
     if not isinstance(table, dict):
-        raise ProfileError(f"{where}: a profile is a table of settings, not {table!r}")
+        raise ProfileError(f"{where()}: a profile is a table of settings, not {table!r}")
     if "name" in table:
-        raise ProfileError(f"{where} name: a profile is called what its table is called; leave the key out")
+        raise ProfileError(f"{where('name')}: a profile is called what its table is called; leave the key out")
+    named = tuple(_tables(_text(PROFILES_FILE), PROFILES_FILE))
+    base = table.get("extends")
+    if base is not None and base not in named:
+        raise ProfileError(f"{where('extends')}: no profile {base!r}: use one of {', '.join(named)}")
+    inherited = {} if base is None else asdict(_named(base))
+    own = {key: value for key, value in table.items() if key != "extends"}
     try:
-        return Profile(**_inherited(where, table) | {"name": name})
+        return Profile(**inherited | own | {"name": name})
     except ValidationError as error:
-        raise ProfileError("; ".join(f"{where} {_complaint(problem)}" for problem in error.errors())) from error
-
-
-def _inherited(where: str, table: dict[str, Any]) -> dict[str, Any]:
-    if "extends" not in table:
-        return table
-    try:
-        base = asdict(_named(str(table["extends"])))
-    except ValueError as error:
-        raise ProfileError(f"{where} extends: {error}") from error
-    return base | {key: value for key, value in table.items() if key != "extends"}
-
-
-def _complaint(problem: Mapping[str, Any]) -> str:
-    key = " ".join(str(part) for part in problem["loc"])
-    return f"{key}: {problem['msg']}".removeprefix(": ").replace("Value error, ", "")
+        said = [(problem["loc"], problem["msg"].removeprefix("Value error, ")) for problem in error.errors()]
+        # A row that is short of what was refused inside it is no complaint of its own.
+        told = [(keys, why) for keys, why in said if not any(keys == other[: len(keys)] != other for other, _ in said)]
+        raise ProfileError("; ".join(f"{where(*keys)}: {why}" for keys, why in told)) from error
 
 
 def _blend(colours: tuple[str, ...], at: float) -> str:

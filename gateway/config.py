@@ -21,6 +21,7 @@ from decoders import control708
 from decoders.definitions import Definitions, load_definitions, parse_definitions
 from decoders.profiles import Profile, load_profile, parse_profile
 from gateway.errors import GatewayError
+from monitor import gate
 from monitor.settings import MonitorSettings
 
 OUR_NAMES = ("core", "host", "journal", "radar")  # of what tells events beside the adapters
@@ -56,6 +57,7 @@ def definitions_of(source: str | TomlFile) -> Definitions:
     """The label set that a channel names. Raises ValueError for an unknown name or a set that is refused."""
     definitions = load_definitions(source) if isinstance(source, str) else parse_definitions(source.text, source.path)
     control708.is_panel(definitions)  # which refuses one that cannot be compared
+    gate.check_mode(definitions)
     return definitions
 
 

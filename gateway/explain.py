@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from decoders import arinc429, arinc708
 from decoders import formats as f
-from decoders.definitions import Definition, DefinitionError, Definitions, load_definitions, set_names
+from decoders.definitions import Definition, Definitions, load_definitions, set_names
 from gateway.errors import GatewayError
 
 Row = tuple[str, ...]  # field, bits, code, meaning; of a 708 word field, bits, code, value, unit, note
@@ -108,7 +108,9 @@ def _label_row(row: Definition) -> tuple[str, ...]:
 def _definitions(name: str) -> Definitions:
     try:
         return load_definitions(name)
-    except (DefinitionError, ValueError, OSError) as error:
+    except OSError as error:
+        raise GatewayError(f"{name} cannot be read: {error.strerror}") from error
+    except ValueError as error:
         raise GatewayError(str(error)) from error
 
 

@@ -50,7 +50,7 @@ class MonitorSettings(BaseModel):
         True, description="demand that the GNSS receiver vouches for its position with labels 273 and 130"
     )
     largest_integrity_limit_nm: float = Field(
-        0.3, gt=0, le=16, description="horizontal integrity limit (130) up to which a position is precise enough, NM"
+        0.3, gt=0, le=15, description="horizontal integrity limit (130) up to which a position is precise enough, NM"
     )
     control_delay_s: float = Field(1.0, ge=0, le=60, description="what the radar may take to do what its panel asks")
 

@@ -1,5 +1,6 @@
 """Label sets are checked when they are read, and a refusal names the file, the set and the label."""
 
+import re
 import sys
 from fractions import Fraction
 from pathlib import Path
@@ -10,6 +11,8 @@ import pytest
 from decoders.definitions import DefinitionError, for_equipment, load_definitions, parse_definitions
 
 BASE = "name = 'n', source = 's', confidence = 'c'"
+COARSE = "encoding = 'bnr', units = 'deg'"
+FINE = "encoding = 'bnr_unsigned', units = 'deg', range = '180/2^20'"
 ANGLE = "encoding = 'bnr', bits = [14, 28], range = 180, lsb = '180/2^15', units = 'deg'"
 
 
@@ -56,6 +59,14 @@ def test_a_file_of_the_users_is_a_set(tmp_path: Path) -> None:
         ("label = '314', encoding = 'disc', bits = [12, 30]", "bits 12 to 30"),
         ("label = '314', encoding = 'disc', bits = [13, 12]", "bits 13 to 12"),
         ("label = '314', encoding = 'bcd', bits = [11, 29], lsb = 0, units = ''", "not positive"),
+        ("label = '314', bits = [11, 29]", "a row needs encoding"),
+        (f"label = '314', {ANGLE}, interval_ms = [1, 2, 3]", r"interval_ms is \[1, 2, 3\]: give the shortest"),
+        (f"label = '314', {ANGLE}, interval_ms = ['1', '2']", r"interval_ms is \['1', '2'\]: give the shortest"),
+        (f"label = '314', {ANGLE}, interval_ms = []", r"interval_ms is \[\]: give the shortest"),
+        (f"label = '314', {ANGLE}, interval_ms = [50, 25]", "the longest is above the shortest"),
+        (f"label = '314', {ANGLE.replace('180/2^15', '1/0')}", "lsb is '1/0': write a number, such as 0.125 or"),
+        (f"label = '314', {ANGLE.replace('2^15', '2^0.5')}", r"lsb is '180/2\^0.5': write a number"),
+        (f"label = '314', {ANGLE.replace('range = 180', 'range = nan')}", "range is nan, which is no number"),
         ("label = '314', encoding = 'bcd', bits = [11, 29], lsb = '1/2^54', units = ''", "too fine"),
     ],
 )
@@ -82,7 +93,12 @@ BAD = f"{{ {BASE}, label = '314', encoding = 'bad' }}"
         (f"rows = [\n# {BAD}\n{ROW}, # label = '314' {{\n{BAD}]", 6),
         (f"rows = [{ROW.replace(chr(39) + 'n' + chr(39), chr(39) + 'label = 314 [{' + chr(39))},\n{BAD}]", 4),
         (f"rows = [\n{{ {BASE}, encoding = 'disc' }}]", 4),
-        ("[[mine.rows]]\nname = 'n'\n[[mine.rows]]\nlabel = '314'", 3),
+        ("[[mine.rows]]\nname = 'n'\n[[mine.rows]]\nlabel = '314'", 4),
+        (
+            f"rows = [\n{{ {BASE.replace(chr(39) + 's' + chr(39), chr(39) * 3 + '{' + chr(10) + chr(39) * 3)},\
+ label = '310', encoding = 'disc' }}, # [\n{BAD}]",
+            6,
+        ),
     ],
 )
 def test_the_line_is_that_of_the_row(rows: str, line: int, tmp_path: Path) -> None:
@@ -91,22 +107,61 @@ def test_the_line_is_that_of_the_row(rows: str, line: int, tmp_path: Path) -> No
         load_definitions(tmp_path / "mine.toml")
 
 
-def test_a_set_that_extends_what_there_is_not_names_the_file(tmp_path: Path) -> None:
-    with pytest.raises(DefinitionError, match=r"mine.toml \[mine\] extends: no definitions 'nothing'"):
-        load_definitions(file_of(tmp_path, f"label = '314', {ANGLE}", head="equipment_id = 1\nextends = 'nothing'"))
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        (f"['my iru'] # c\nequipment_id = 1\nrows = [\n{ROW},\n{BAD}]", "5 [my iru] label 314"),
+        (f"my.equipment_id = 1\nmy.rows = [{ROW},\n{BAD}]", "3 [my] label 314"),
+        (f"my = {{ equipment_id = 1, rows = [\n{ROW},\n{BAD}] }}", "3 [my] label 314"),
+        (f"[my]\r\nequipment_id = 1\r\nrows = [\r\n{ROW},\r\n{BAD}]", "5 [my] label 314"),
+        ("[my]\nequipment_id = 1\nrows = [\n{},\n]", "4 [my] label ?"),
+        ("[my]\nrows = []\n\nequipment_id = true", "4 [my]"),
+        ("[my]\n# c\nrows = []\n", "3 [my]"),
+    ],
+)
+def test_the_line_is_known_in_every_form_of_toml(text: str, place: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_bytes(text.encode())
+    with pytest.raises(DefinitionError, match=rf"mine.toml:{re.escape(place)}: "):
+        load_definitions(tmp_path / "mine.toml")
+
+
+@pytest.mark.parametrize("base", ["'nothing'", "['iru_704']", "7", "'/tmp/mine.toml'"])
+def test_a_set_that_extends_what_there_is_not_names_those_there_are(base: str, tmp_path: Path) -> None:
+    with pytest.raises(
+        DefinitionError, match=r"mine.toml:3 \[mine\]: extends is .*: name one of gnss_743a, "
+    ) as caught:
+        load_definitions(file_of(tmp_path, f"label = '314', {ANGLE}", head=f"equipment_id = 1\nextends = {base}"))
+    assert "or a .toml" not in str(caught.value)
+
+
+def test_a_remainder_is_refused_with_the_line_of_the_row_that_broke_it(tmp_path: Path) -> None:
+    """The remainder itself, or the row that took the place of its inherited coarse word."""
+    own = "label = '056', encoding = 'bnr_unsigned', bits = [18, 28], range = 1, lsb = '1/2^11', units = 'm'"
+    coarse = "label = '061', encoding = 'bnr', bits = [10, 28], range = 268435456, lsb = 512, units = 'm'"
+    head = "equipment_id = 11\nextends = 'gnss_743a'"
+    for row, label in ((own + ", fine_of = '061'", "056"), (coarse, "062")):
+        with pytest.raises(DefinitionError, match=rf"mine.toml:4 \[mine\] label {label}: no remainder of label 061"):
+            load_definitions(file_of(tmp_path, row, head=head))
+        load_definitions.cache_clear()
 
 
 @pytest.mark.parametrize(
     ("row", "why"),
     [
-        ("bits = [11, 28], range = 180, lsb = '180/2^18'", "a position is joined from bits 9 to 28"),
-        ("bits = [9, 28], range = 90, lsb = '90/2^20'", "a position is joined from bits 9 to 28"),
+        (f"'110', {COARSE}, bits = [11, 28], range = 180, lsb = '180/2^18'", "joined from bits 9 to 28"),
+        (f"'111', {COARSE}, bits = [9, 28], range = 90, lsb = '90/2^20'", "joined from bits 9 to 28"),
+        (f"'120', {FINE}, bits = [17, 28], lsb = '180/2^32', fine_of = '110'", "joined from bits 18 to 28"),
+        (f"'121', {FINE}, bits = [18, 28], lsb = '180/2^31', fine_of = '110'", "fine_of 111"),
+        (f"'121', {FINE}, bits = [18, 28], lsb = '180/2^31'", "fine_of 111"),
     ],
 )
 def test_a_position_word_that_would_not_be_read_as_it_is_defined_is_refused(row: str, why: str, tmp_path: Path) -> None:
-    text = f"label = '110', encoding = 'bnr', units = 'deg', {row}"
-    with pytest.raises(DefinitionError, match=why):
-        load_definitions(file_of(tmp_path, text, head="equipment_id = 0x00B\nextends = 'gnss_743a'"))
+    """With the rest of the set inherited, or all by itself."""
+    for base in ("\nextends = 'gnss_743a'", ""):
+        file = file_of(tmp_path, f"label = {row}", head=f"equipment_id = 0x00B{base}")
+        with pytest.raises(DefinitionError, match=rf"mine.toml:{3 + bool(base)} \[mine\] label 1.*{why}"):
+            load_definitions(file)
+        load_definitions.cache_clear()
 
 
 def test_a_set_that_extends_another_replaces_labels_and_keeps_the_rest(tmp_path: Path) -> None:
@@ -127,7 +182,7 @@ def test_a_set_that_extends_another_replaces_labels_and_keeps_the_rest(tmp_path:
         ("[a]\nequipment_id = 1\nrows = []\nrowz = []", "a set has equipment_id"),
         ("[a]\nequipment_id = 1\nrows = [7]", "7 is no row"),
         ("[a]\nequipment_id = 1\nrows = []", "at least one row"),
-        ("[a]\nequipment_id = 1\nrows = [{ lsb = inf }]", "is no TOML"),
+        ("[a]\nequipment_id = 1\nrows = [{ lsb = inf }]", "lsb is inf, which is no number"),
         ("a = ", "is no TOML"),
         ("[a]\nequipment_id = '0x0B'\nrows = []", "equipment_id is a number"),
         ("[a]\nequipment_id = -5\nrows = []", "equipment_id is a number"),

@@ -124,6 +124,7 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
     "no word": (lambda d: ["decode", "429", ""], ("'': 0 digits given, 8 needed",)),
     "a digit short": (lambda d: ["decode", "429", "0Xe32000a"], ("'0Xe32000a': 7 digits given, 8", "is missing")),
     "unknown set": (lambda d: ["decode", "429", "00000001", "--set", "gps"], ("no definitions 'gps'", "gnss_743a")),
+    "missing set": (lambda d: ["labels", "--set", d / "no.toml"], ("no.toml cannot be read: No such file",)),
     "half a configuration": (lambda d: ["thresholds", "--n", "60"], ("give all of --n",)),
     "source without port": (lambda d: ["run", "--source", "serial:socket://host"], ("socket://HOST:PORT",)),
     "source port too high": (

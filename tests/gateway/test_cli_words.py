@@ -123,7 +123,7 @@ def test_a_radar_word_is_explained_by_a_profile_of_ones_own(tmp_path: Path) -> N
 
 def test_a_mistake_in_a_profile_of_ones_own_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text('[own]\nextends = "arinc708"\nbin = 3\n')
-    for name, complaint in (("own.toml", "own.toml [own] bin: Unexpected"), ("no.toml", "no.toml cannot be read")):
+    for name, complaint in (("own.toml", "own.toml:3 [own] bin: Unexpected"), ("no.toml", "no.toml cannot be read")):
         done = shadebus("decode", "708", "b443047a0e80767c", "--profile", tmp_path / name)
         assert done.returncode == 1
         assert complaint in done.stderr

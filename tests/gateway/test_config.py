@@ -56,6 +56,7 @@ def test_paths_count_from_where_the_rack_file_lies(tmp_path: Path) -> None:
         ('radar_profile = "x"\n' + ADAPTER, "radar_profile: no profile 'x': use one of"),
         (ADAPTER + "[recording]\nsync_interval_s = 0", "recording.sync_interval_s: .*greater than 0"),
         (ADAPTER + "[monitor]\np_fa = 0.7", "monitor.p_fa: .*less than 0.5"),
+        (ADAPTER + "[monitor]\nlargest_integrity_limit_nm = 16", "largest_integrity_limit_nm: .*or equal to 15"),
         (ADAPTER + "[monitr]\np_fa = 0.1", "monitr: Extra inputs"),
         (ADAPTER + ADAPTER, "two adapters are named 'bridge'"),
         ("adapters = [", "is not TOML"),
@@ -142,8 +143,8 @@ def test_profiles_and_definitions_of_ones_own_count_from_the_rack_file_and_are_k
 @pytest.mark.parametrize(
     ("profile", "labels", "where"),
     [
-        (OWN_PROFILE + "bins = 1", OWN_SET, r"channels\.0\.profile: .*radar\.toml \[my_radar\] bins: .*64"),
-        (OWN_PROFILE + "bins = 1", OWN_SET, r"radar_profile: .*radar\.toml \[my_radar\] bins: .*64"),
+        (OWN_PROFILE + "bins = 1", OWN_SET, r"channels\.0\.profile: .*radar\.toml:4 \[my_radar\] bins: .*multiple of 8"),
+        (OWN_PROFILE + "bins = 1", OWN_SET, r"radar_profile: .*radar\.toml:4 \[my_radar\] bins: .*multiple of 8"),
         ("[", OWN_SET, r"radar\.toml is no TOML"),
         (OWN_PROFILE, "[", r"channels\.1\.definitions: .*labels\.toml is no TOML"),
         (OWN_PROFILE, OWN_SET.replace("310", "999"), r"labels\.toml:[0-9]+ \[my_box\] label 999"),
@@ -170,3 +171,12 @@ def test_sizes_of_shadows_that_exclude_each_other_are_refused() -> None:
     sizes = {"minimum_size": 10, "maximum_size": 5}
     with pytest.raises(GatewayError, match="maximum_size 5 is below minimum_size 10"):
         check_config({"adapters": [{"name": "a", "source": "serial:x"}], "monitor": sizes}, "test")
+
+
+@pytest.mark.parametrize("bits", ["[26, 28]", "[22, 28]", "28"])
+def test_a_mode_of_the_receiver_that_would_be_misread_is_refused(bits: str, tmp_path: Path) -> None:
+    row = f"label = '273', name = 'n', encoding = 'disc', fields = {{ mode = {bits} }}, source = 's', confidence = 'c'"
+    (tmp_path / "own.toml").write_text(f"[own]\nequipment_id = 0x00B\nextends = 'gnss_743a'\nrows = [{{ {row} }}]")
+    text = ADAPTER + '[adapters.channels.1]\nkind = "arinc429"\ndefinitions = "own.toml"'
+    with pytest.raises(GatewayError, match=r"definitions: \[own\] label 273: mode has . bits: give it all 5"):
+        load(tmp_path, text)

@@ -313,8 +313,9 @@ def test_a_stale_state_is_named(white_mountains: Terrain, honest: Scan) -> None:
     [
         ({"gnss_mode": 0b01000}, "the GNSS receiver's mode is acquisition"),
         ({"gnss_mode": 0b11111}, "the GNSS receiver's mode is fault"),
-        ({"horizontal_integrity_limit_m": 16 * 1852 * (1 - 2**-17)}, "integrity limit is 16.00 NM, above 0.3"),
+        ({"horizontal_integrity_limit_m": 16 * 1852 * (1 - 2**-17)}, "integrity limit is 15.9999 NM, above 0.3"),
         ({"horizontal_integrity_limit_m": 0.31 * 1852}, "integrity limit is 0.31 NM, above 0.3"),
+        ({"horizontal_integrity_limit_m": 2458 * 16 / 2**17 * 1852}, "integrity limit is 0.300049 NM, above 0.3"),
         ({"gnss_satellite_failure": 1.0}, "has detected a satellite failure"),
     ],
 )
