@@ -29,7 +29,7 @@ def play(
 
     The clock starts when the first unit has gone out. Ends with the traffic, at `stop`, or when the outlet's reader
     leaves; a write that waits for a slow reader is ended by closing the outlet. What happens to the plug happens to
-    the outlet, which must have `unplug` and `replug`. Raises ValueError for a speed that is not positive.
+    the outlet, which must have `drain`, `unplug` and `replug`. Raises ValueError for a speed that is not positive.
     """
     if not speed > 0:
         raise ValueError(f"speed {speed} must be above 0: 1 is real time, inf does not wait")
@@ -41,7 +41,8 @@ def play(
         if halt.wait(max(0.0, origin + due_s - time.monotonic()) if origin is not None else 0.0):
             break
         if isinstance(unit, Plug):
-            getattr(outlet, unit.value)()
+            for method in unit.value:
+                getattr(outlet, method)()
             continue
         try:
             outlet.write(unit)

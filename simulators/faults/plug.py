@@ -13,10 +13,13 @@ Unit = TypeVar("Unit")
 
 
 class Plug(Enum):
-    """What happens to the plug; the value is the method of an outlet that does it."""
+    """What happens to the plug; the value is the methods of an outlet that do it.
 
-    OUT = "unplug"
-    IN = "replug"
+    What was written before is read first, so that the same seed loses the same bytes however slow the reader is.
+    """
+
+    OUT = ("drain", "unplug")
+    IN = ("replug",)
 
 
 def plugged(units: Iterator[tuple[int, Unit]], scenario: Scenario) -> Iterator[tuple[int, Unit | Plug]]:

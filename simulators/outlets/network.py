@@ -28,6 +28,9 @@ class TcpOutlet(Closing):
         except OSError as error:
             raise Closed(f"the client of {self.address} has left: {error}") from error
 
+    def drain(self) -> None:
+        """Nothing to wait for: what was sent arrives before the end of the connection."""
+
     def unplug(self) -> None:
         """The client is cut off, nobody can connect, and what is written now vanishes."""
         self._plugged = False
