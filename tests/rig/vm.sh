@@ -14,7 +14,7 @@ set -euo pipefail
 PROJECT=$(realpath "$(dirname "$0")/../..")
 CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/shadebus-rig # what was downloaded and made once: kernel, modules, first root
 ROOT_SHARE="trans=virtio,version=9p2000.L,msize=262144"
-LIMIT_S=300
+LIMIT_S=600
 
 die() {
   echo "vm.sh: $*" >&2
