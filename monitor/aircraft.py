@@ -234,7 +234,7 @@ class Aircraft:
         if others := set(sdi[heard].tolist()) - {source}:
             self._strange[f"SDI {source} of equipment {equipment:02X}"] = (
                 f"words of SDI {', '.join(map(str, sorted(others)))} are left out, as this one was heard first: "
-                "say with sdi which one the channel is to use"
+                "say with sdi which one the channel is to use, or with definitions that bits 9 and 10 are data"
             )
         return np.asarray((sdi == 0) | (sdi == source))
 

@@ -143,7 +143,11 @@ def test_profiles_and_definitions_of_ones_own_count_from_the_rack_file_and_are_k
 @pytest.mark.parametrize(
     ("profile", "labels", "where"),
     [
-        (OWN_PROFILE + "bins = 1", OWN_SET, r"channels\.0\.profile: .*radar\.toml:4 \[my_radar\] bins: .*multiple of 8"),
+        (
+            OWN_PROFILE + "bins = 1",
+            OWN_SET,
+            r"channels\.0\.profile: .*radar\.toml:4 \[my_radar\] bins: .*multiple of 8",
+        ),
         (OWN_PROFILE + "bins = 1", OWN_SET, r"radar_profile: .*radar\.toml:4 \[my_radar\] bins: .*multiple of 8"),
         ("[", OWN_SET, r"radar\.toml is no TOML"),
         (OWN_PROFILE, "[", r"channels\.1\.definitions: .*labels\.toml is no TOML"),

@@ -352,3 +352,16 @@ def test_of_several_sources_on_one_bus_the_configured_one_is_used() -> None:
     packets = [bridge.words(IRU, k / 50, pitch) for k in range(5)]
     (state,) = only(StateEvent, feed(pipeline, raw(1, 0.08, b"".join(packets)), tick(2, 0.08)))
     assert state.values["pitch_deg"] == 2000 * 180 / 2**14
+
+
+def test_of_several_sources_that_nobody_chose_the_first_is_used_and_the_next_verdict_says_so(monitor: Monitor) -> None:
+    bridge, pipeline = Bridge(), Pipeline(RACK, monitor)
+    pitch = [word429(0o324, {9: (sdi, 2), 15: (1000 * sdi, 15)}, ssm=3) for sdi in (1, 2, 3)]
+    packets = [bridge.hello(), *(bridge.words(IRU, k / 50, pitch) for k in range(5))]
+    events = [*feed(pipeline, raw(1, 0.08, b"".join(packets)), tick(2, 0.08))]
+    (state,) = only(StateEvent, events)
+    assert state.values["pitch_deg"] == 1000 * 180 / 2**14
+    (told,) = [event for event in only(StatusEvent, events) if event.state == "STATE_DOUBT"]
+    assert told.reason.startswith("words of SDI 2, 3 are left out")
+    (verdict,) = only(IntegrityEvent, feed(pipeline, raw(3, 1, sweep(bridge, 1))))
+    assert any(reason.startswith("degraded: SDI 1 of equipment 04: words of SDI 2, 3") for reason in verdict.reasons)
