@@ -9,7 +9,7 @@ demo: $(READY)
 	$(BIN)/shadebus demo
 
 test: lint
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses 2 --dist loadfile
 
 # The adapters against a real kernel and its devices, in a machine that QEMU emulates; see docs/rig.md. Plugins that
 # these tests do not use would take longer to import there than the tests themselves.
