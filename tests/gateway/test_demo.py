@@ -43,7 +43,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Shown:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(demo, "LEG_S", 3 * demo.SWEEP_S)
         patch.setattr(demo, "GNSS_FAILS_S", 6.0)
-        patch.setattr(demo, "Console", lambda: Console(file=printed, width=200))
+        patch.setattr(demo, "plain_console", lambda: Console(file=printed, width=200, markup=False))
         patch.setattr(signal, "signal", lambda *_: None)  # Ctrl-C is for pytest
         demo.fly(out, seed=7, speed=10.0, stop=stopping.Stop())
     page = (out / "report" / "index.html").read_text()
