@@ -24,6 +24,7 @@ from monitor.warmup import warm_up
 FIRST_OPEN_S = 3.0
 POLL_S = 0.1
 MOST_FAILURES = 10
+DRIVER_S = 5.0  # for all drivers to come back from a read, or from opening a device that takes no bytes
 LAST_WORDS_S = 30.0  # for a backlog of events; then the process ends whether they were read or not
 
 
@@ -92,8 +93,11 @@ class Service:
         """Stop reading, write down what was read, answer what was written, then return."""
         for supervisor in self._supervisors:
             supervisor.stop()
+        give_up_s = time.monotonic() + DRIVER_S
         for thread in self._adapter_threads:
-            thread.join()
+            thread.join(max(give_up_s - time.monotonic(), 0))
+            if thread.is_alive():
+                self.failures.append(f"{thread.name}: its driver does not come back; it is left behind")
         self._journal.queue.close()
         self._journal_thread.join()
         self._to_core.queue.close()

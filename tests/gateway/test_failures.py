@@ -283,3 +283,24 @@ def test_a_listener_that_stands_still_cannot_hold_the_gateway(
     path = service.recording_path
     assert path is not None
     assert stream.startswith(recorded_bytes(path))
+
+
+def test_a_driver_that_never_comes_back_is_left_behind_and_told(
+    line: PtyOutlet, make_rack: MakeRack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entered, release = threading.Event(), threading.Event()
+
+    class Stuck:
+        def open(self) -> Port:
+            entered.set()
+            release.wait(60)
+            raise OSError("at last")
+
+    monkeypatch.setattr(service_module, "make_adapter", lambda _: Stuck())
+    monkeypatch.setattr(service_module, "DRIVER_S", 0.2)
+    config = make_rack(f"serial:{line.path}", wait_for_devices=True)
+    with Background(config) as gateway:
+        wait_until(entered.is_set, "opening")
+    release.set()
+    assert gateway.service.failures == ["adapter bridge: its driver does not come back; it is left behind"]
+    assert [record.state for record in records(path_of(gateway)) if isinstance(record, Status)] == ["OPENING"]
