@@ -5,7 +5,6 @@ Findings are told when they begin and when they end, never word by word. Nothing
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -38,14 +37,27 @@ class Finding(NamedTuple):
     reason: str
 
 
-@dataclass
-class _Rate:
-    """Words of one label since it was last judged, the last one of before included, and when they came."""
+class _Rates:
+    """By label (256,): words since it was last judged, the last one of before included, when they came, words ever."""
 
-    first_ns: int
-    last_ns: int
-    count: int = 0
-    ever: int = 0
+    def __init__(self) -> None:
+        self.first_ns = np.zeros(256, np.int64)
+        self.last_ns = np.zeros(256, np.int64)
+        self.count = np.zeros(256, np.int64)
+        self.ever = np.zeros(256, np.int64)
+
+    def feed(self, labels: npt.NDArray[np.uint8], time_ns: npt.NDArray[np.int64]) -> None:
+        """Take words (n,) in rising time."""
+        new = self.ever[labels] == 0
+        self.first_ns[labels[new][::-1]] = time_ns[new][::-1]  # of a label that comes again, the first one stays
+        self.last_ns[labels] = time_ns
+        came = np.bincount(labels, minlength=256)
+        self.count += came
+        self.ever += came
+
+    def judged(self, label: int) -> None:
+        """What came so far is judged."""
+        self.first_ns[label], self.count[label] = self.last_ns[label], 1
 
 
 class BusHealth:
@@ -57,9 +69,9 @@ class BusHealth:
         self._orientation = orientation
         self._speed = "low" if kind == KIND_429_LOW else "high"
         self.has_sdi = np.isin(np.arange(256), [label for label, row in definitions.labels.items() if row.has_sdi])
-        self._sources: set[tuple[int, int]] = set()  # label and SDI of the words of this second
+        self._sources = np.zeros((256, 4), np.bool_)  # by label and SDI, whether this second had such a word
         self._is_known = np.isin(np.arange(256), list(definitions.labels))
-        self._rates: dict[int, _Rate] = {}
+        self._rates = _Rates()
         self._wrong: set[str] = set()
         self._second_ns: int | None = None  # when the current second began
         self._words = 0
@@ -72,23 +84,19 @@ class BusHealth:
         now_ns = int(time_ns[-1])
         if self._second_ns is None or now_ns < self._second_ns:  # the first word, or a clock that began anew
             self._second_ns = int(time_ns[0])
-            self._rates.clear()
+            self._rates = _Rates()
             self._words = -1  # its first word opens the second and is not of it
         good = values.status != Status.BAD_PARITY
         labels = values.label[good]
         self._words += len(values.label)
         sourced = good & self.has_sdi[values.label]
         sdi = words[sourced] >> np.uint32(8) & np.uint32(3)
-        self._sources |= set(zip(values.label[sourced].tolist(), sdi.tolist(), strict=True))
+        self._sources[values.label[sourced], sdi] = True
         self._known["bad parity"] += len(values.label) - len(labels)
         self._known["good"] += len(labels)
         self._known["known"] += int(self._is_known[labels].sum())
         self._known["known if turned"] += int(self._is_known[TURNED[labels]].sum())
-        for label, at_ns in zip(labels.tolist(), time_ns[good].tolist(), strict=True):
-            rate = self._rates.setdefault(label, _Rate(at_ns, at_ns))
-            rate.last_ns = at_ns
-            rate.count += 1
-            rate.ever += 1
+        self._rates.feed(labels, time_ns[good])
         for said in values.value[(values.label == EQUIPMENT) & (values.status == Status.NORMAL)].astype(int).tolist():
             reason = f"the box says it is equipment {said:03X}, it is read as {self._definitions.name}"
             yield from self._tell("equipment", said & 0xFF != self._definitions.equipment_id & 0xFF, reason)
@@ -101,33 +109,34 @@ class BusHealth:
         most = MOST_WORDS_PER_S[self._speed]
         reason = f"{load:.0f} words/s, a {self._speed} speed bus carries {most:.1f} at most"
         yield from self._tell("load", load > OVERLOAD * most, reason)
-        for label, rate in self._rates.items():
-            yield from self._rate(label, rate, now_ns)
+        for label in np.flatnonzero(self._rates.ever).tolist():
+            yield from self._rate(label, now_ns)
         if self._known["good"] + self._known["bad parity"] >= ENOUGH_WORDS:
             yield from self._reading()
-        several = Counter(label for label, sdi in self._sources if sdi)
-        shared = ", ".join(f"{label:03o}" for label, count in sorted(several.items()) if count > 1)
+        several = np.flatnonzero(self._sources[:, 1:].sum(axis=1) > 1)
+        shared = ", ".join(f"{label:03o}" for label in several)
         reason = f"labels {shared} come from several sources (SDI): say with sdi which one the channel is to use"
         yield from self._tell("sources", bool(shared), reason)
-        self._sources.clear()
+        self._sources[:] = False
         self._second_ns, self._words = now_ns, 0
 
-    def _rate(self, label: int, rate: _Rate, now_ns: int) -> Iterator[Finding]:
+    def _rate(self, label: int, now_ns: int) -> Iterator[Finding]:
+        rates = self._rates
         definition = self._definitions.labels.get(label)
         shortest, longest = definition.interval_ms if definition and definition.interval_ms else (0.0, None)
-        if rate.count > 1 and f"label {label:03o}" in self._wrong:  # the gap that was told is no interval
-            rate.first_ns, rate.count = rate.last_ns, 1
-        if rate.count > 1:
-            mean_ms = (rate.last_ns - rate.first_ns) / 1e6 / (rate.count - 1)
+        if rates.count[label] > 1 and f"label {label:03o}" in self._wrong:  # the gap that was told is no interval
+            rates.judged(label)
+        if rates.count[label] > 1:
+            mean_ms = float(rates.last_ns[label] - rates.first_ns[label]) / 1e6 / (rates.count[label] - 1)
             said = f"label {label:03o} comes every {mean_ms:.1f} ms"
             wrong = _beyond(-mean_ms, -TOO_FAST[0] * shortest, -TOO_FAST[1] * shortest)
             yield from self._tell(f"rate of {label:03o}", wrong, f"{said}, {shortest:g} is the shortest interval")
             if longest:
                 wrong = _beyond(mean_ms, TOO_SLOW[0] * longest, TOO_SLOW[1] * longest)
                 yield from self._tell(f"slowness of {label:03o}", wrong, f"{said}, {longest:g} is the longest interval")
-            rate.first_ns, rate.count = rate.last_ns, 1
-        if longest and rate.ever >= OFTEN:
-            silent_ms = (now_ns - rate.last_ns) / 1e6
+            rates.judged(label)
+        if longest and rates.ever[label] >= OFTEN:
+            silent_ms = (now_ns - int(rates.last_ns[label])) / 1e6
             stopped = f"label {label:03o} has not come for {silent_ms:.0f} ms, {longest:g} is the longest interval"
             yield from self._tell(f"label {label:03o}", silent_ms > max(STOPPED * longest, 1000.0), stopped)
 

@@ -6,12 +6,14 @@ opened again stays lost for the reason that it was lost for first; attempts sinc
 
 import contextlib
 import threading
+import time
 from collections.abc import Callable
 
 from gateway.adapters import Adapter, Port, Reading
 from gateway.errors import GatewayError
 
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.5, 5.0
+SMALL_BYTES, GATHER_S = 2048, 0.004  # a line that gives little at a time is let gather more: each chunk has its price
 
 Report = Callable[[str, str, str], None]  # adapter, state, reason
 Deliver = Callable[[str, Reading], None]  # adapter, what it read
@@ -72,6 +74,8 @@ class Supervisor:
                     gave = True
                 if reading.remark:
                     self._state("UP", reading.remark)
+                if 0 < len(reading.data) < SMALL_BYTES:
+                    time.sleep(GATHER_S)
         except Exception as error:  # noqa: BLE001 # pyserial alone raises four unrelated kinds on unplugging
             self._lose(_reason(error))
         finally:
