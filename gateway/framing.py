@@ -16,15 +16,21 @@ class Form(NamedTuple):
 
     framer: Callable[[], PacketFramer]
     unit: str
+    advice: str  # where something comes, and no packet
 
 
-STREAM = Form(Framer, "bytes")
-DATAGRAMS = {"racklink": Form(DatagramFramer, "datagrams"), "bare708": Form(BareFramer, "datagrams")}
-CAN_TEXTS = {
-    "slcan": Form(lambda: CanFramer(Slcan()), "bytes"),
-    "socketcand": Form(lambda: CanFramer(Socketcand()), "bytes"),
+SPEAKS = "check the baud rate and that the bridge speaks RackLink"
+FRAMES = "check that the bridge sends RackLink's identifiers and that its bit rate is the bus's"
+STREAM = Form(Framer, "bytes", SPEAKS)
+DATAGRAMS = {
+    "racklink": Form(DatagramFramer, "datagrams", 'check that the sender speaks RackLink, or set framing = "bare708"'),
+    "bare708": Form(BareFramer, "datagrams", "check that each datagram is one radar word"),
 }
-CAN = Form(lambda: CanFramer(Recorded()), "frames")
+CAN_TEXTS = {
+    "slcan": Form(lambda: CanFramer(Slcan()), "bytes", FRAMES),
+    "socketcand": Form(lambda: CanFramer(Socketcand()), "bytes", FRAMES),
+}
+CAN = Form(lambda: CanFramer(Recorded()), "frames", FRAMES)
 
 
 def form_of(config: AdapterConfig) -> Form:

@@ -1,6 +1,6 @@
 """Who is heard and who fell silent: adapters by their packets, channels by their words, the radar by its radials."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator, Mapping
 
 QUIET_NS = 5_000_000_000
 RADAR = "radar"  # the name under which the radar's silence is told, whatever its bridge still sends
@@ -9,8 +9,9 @@ RADAR = "radar"  # the name under which the radar's silence is told, whatever it
 class Hearing:
     """When each source was last heard, by the monotonic time of the records."""
 
-    def __init__(self, adapters: Collection[str]) -> None:
-        self._adapters = adapters
+    def __init__(self, advice: Mapping[str, str]) -> None:
+        """`advice` says of each adapter what to look at where something comes, and no packet."""
+        self._advice = advice
         self._heard_ns: dict[str, int] = {}
         self._bytes_ns: dict[str, int] = {}  # an adapter's last bytes, whatever they were
         self._quiet: set[str] = set()
@@ -48,7 +49,7 @@ class Hearing:
         bytes_ns = self._bytes_ns.get(source)
         if bytes_ns is None or now_ns - bytes_ns > QUIET_NS:
             return silent
-        return f"{silent}, though bytes come: check the baud rate and that the bridge speaks RackLink"
+        return f"{silent}, though bytes come: {self._advice[source]}"
 
     def _things(self, source: str) -> str:
-        return "packets" if source in self._adapters else "words"
+        return "packets" if source in self._advice else "words"

@@ -21,6 +21,7 @@ from gateway.framing import form_of
 from monitor.utc import TIME, UTC_LABELS
 
 SEQUENCE_RANGE = 1 << 32
+GOES_BACK_NS = 1_000_000_000  # more than any order of packets
 RECENT = 32  # packets among which a network may repeat or overtake one
 FLAG_NAMES = {
     f.FLAG_FIFO_OVERFLOW: "fifo_overflow",
@@ -86,11 +87,13 @@ class Link:
     books: defaultdict[int, Books] = field(default_factory=lambda: defaultdict(Books))  # by channel
     _recent: deque[Packet] = field(default_factory=lambda: deque(maxlen=RECENT))
     _next_sequence: int | None = None
+    _latest_ns: int = 0  # of the bridge's clock
+    _clock_went_back: bool = False  # since the last heartbeat
     _said: dict[int, int] = field(default_factory=dict)  # by channel, its equipment as its last label 377 said
 
     def __post_init__(self) -> None:
         form = form_of(self.config)
-        self.framer, self._unit = form.framer(), form.unit
+        self.framer, self._unit, self.advice = form.framer(), form.unit, form.advice
         for number, channel in self.config.channels.items():
             if channel.kind == "arinc708":
                 self.channels[number] = Channel708(
@@ -178,6 +181,9 @@ class Link:
             return False
         self._recent.append(packet)
         self.counters["packets"] += 1
+        if packet.type in (f.WORDS_429, f.WORD_708):
+            self._clock_went_back |= packet.time_ns < self._latest_ns - GOES_BACK_NS
+            self._latest_ns = packet.time_ns
         for bit, name in FLAG_NAMES.items():
             if packet.flags & bit:
                 self.counters[name] += 1
@@ -188,12 +194,14 @@ class Link:
             if gap < SEQUENCE_RANGE // 2:
                 self.counters["packets_lost"] += gap
                 self.losses["packets lost"] += gap
-            elif gap >= SEQUENCE_RANGE - RECENT and packet.time_ns < self._recent[-2].time_ns:
+            elif gap >= SEQUENCE_RANGE - RECENT and packet.time_ns < max(other.time_ns for other in self._recent):
                 self.counters["packets_late"] += 1
                 self.counters["packets_lost"] -= 1
                 return True
             else:
                 self.counters["sequence_restarts"] += 1
+                for books in self.books.values():
+                    books.restart()
         self._next_sequence = (packet.sequence + 1) % SEQUENCE_RANGE
         return True
 
@@ -204,12 +212,15 @@ class Link:
         channel = self.channels.get(number)
         return channel if isinstance(channel, Channel708) else None
 
-    def heartbeat(self, counts: tuple[ChannelCount, ...]) -> None:
-        """Take what the bridge says that it sent and that it lost itself; what is newly lost is told."""
+    def heartbeat(self, counts: tuple[ChannelCount, ...]) -> dict[str, int]:
+        """Take what the bridge says that it sent and that it lost itself; what is newly lost, by where."""
         before = self._words_lost()
         for count in counts:
-            self.books[count.channel].say(count)
-        self.losses.update({what: max(lost - before[what], 0) for what, lost in self._words_lost().items()})
+            self.books[count.channel].say(count, self._clock_went_back)
+        self._clock_went_back = False
+        new = {what: max(lost - before[what], 0) for what, lost in self._words_lost().items()}
+        self.losses.update(new)
+        return {what: count for what, count in new.items() if count}
 
     def dropped(self, count: int) -> None:
         """Count bytes, frames or datagrams that the gateway or its kernel had no room for."""

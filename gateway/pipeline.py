@@ -55,7 +55,7 @@ class Pipeline:
         self._counters: Counter[str] = Counter()
         self._now_ns = 0  # common time of the latest word
         self._now_host_ns: int | None = None  # and when that word was read
-        self._hearing = Hearing(self._links)
+        self._hearing = Hearing({name: link.advice for name, link in self._links.items()})
         self._users: dict[str, tuple[tuple[str, int], int]] = {}  # by role: adapter and channel, and when last heard
         self._unused: dict[tuple[str, int], str] = {}  # why a channel is not used, told already
         self._doubted: set[str] = set()  # quantities whose words seem to be read in a wrong way, told already
@@ -125,14 +125,23 @@ class Pipeline:
             raise MalformedBody("device time is beyond any clock")
         if packet.type == f.HELLO:
             link.hello(hello(packet))
+            self._expect(link, record)
         elif packet.type == f.WORDS_429:
             yield from self._words(link, packet, record)
         elif packet.type == f.WORD_708:
             yield from self._radar(link, packet, record)
         elif packet.type == f.HEARTBEAT:
-            link.heartbeat(heartbeat(packet))
+            if lost := link.heartbeat(heartbeat(packet)):
+                reason = ", ".join(f"{count} {what}" for what, count in lost.items())
+                yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "LOSS", reason)
         elif packet.type != f.TIME_MARK:
             link.counters["packets_of_unknown_type"] += 1
+
+    def _expect(self, link: Link, record: Raw) -> None:
+        """What a bridge has announced shall be heard."""
+        for number, channel in link.channels.items():
+            source = f"{record.adapter}/{number}" if isinstance(channel, Channel429) else RADAR
+            self._hearing.expect(source, record.stamp.monotonic_ns)
 
     def _claim(self, link: Link, packet: Packet, record: Raw) -> Generator[Event, None, bool]:
         """Whether the words of a packet can be used; if not, why is said once.

@@ -36,6 +36,7 @@ def lines(records: Iterable[Record], config: RackConfig) -> Iterator[str]:
 
 def _words(link: Link, packet: Packet) -> Iterator[str]:
     block = words429(packet)
+    link.identify(packet)
     channel = link.channels.get(packet.channel)
     if not isinstance(channel, Channel429) or packet.flags & SPOILT:
         why = "not decoded" if packet.flags & SPOILT else "channel without definitions"

@@ -5,6 +5,7 @@ the interface can be opened with `?listen_only=true`, if it knows that.
 """
 
 import contextlib
+import errno
 import logging
 import re
 import socket
@@ -14,10 +15,10 @@ from typing import Any
 from urllib.parse import parse_qsl
 
 import can
+from can.interfaces.socketcand import socketcand
 
 from decoders import formats as f
-from gateway.adapters import NOTHING, Adapter, Port, Reading, stream
-from gateway.adapters.serial import SerialPort
+from gateway.adapters import NOTHING, Adapter, Port, Reading, serial, stream
 from gateway.adapters.socketcan import SocketCanAdapter
 from gateway.adapters.sockets import LONGEST_WAIT_S, wait
 from gateway.config import AdapterConfig
@@ -29,7 +30,9 @@ logging.getLogger("can").propagate = False
 
 HEAD = struct.Struct(f.CAN_RECORD)
 MOST_AT_ONCE = 512
+CONNECT_S = 2.0
 LARGEST_READ = 65_536
+MENDS = {**serial.MENDS, errno.ECONNREFUSED: "connection refused: start socketcand there, or mend ?host= and &port="}
 WORDS = {"true": True, "false": False}
 DEFAULTS: dict[str, dict[str, Any]] = {
     "slcan": {"sleep_after_open": 0.0},  # python-can's own 2 s, for boards that restart, are an option
@@ -115,14 +118,29 @@ class CanAdapter:
         try:
             bus = can.Bus(interface=self.interface, channel=self.channel, ignore_config=True, **self.options)
         except Exception as error:  # each driver has kinds of its own
-            raise GatewayError(f"{place}: {error or type(error).__name__}") from error
+            raise GatewayError(
+                f"{place}: {MENDS.get(serial.error_number(error.__context__ or error)) or error}"
+            ) from error
         if self.interface == "slcan":
             line = getattr(bus, "serialPortOrig")  # noqa: B009 # of the driver
             line.timeout = 0
-            return TextPort(bus, SerialPort(line, telnet="://" in self.channel))
+            return TextPort(bus, serial.SerialPort(line, telnet="://" in self.channel))
         if self.interface == "socketcand":
             return TextPort(bus, TcpLine(getattr(bus, "_SocketCanDaemonBus__socket")))  # noqa: B009 # as above
         return BusPort(bus)
+
+
+def _connect(line: socket.socket, host: str, port: int) -> None:
+    """Connect soon or not at all: python-can would try for ten seconds, and wait for the greeting for ever."""
+    line.settimeout(CONNECT_S)
+    try:
+        line.connect((host, port))
+    except OSError:
+        line.close()
+        raise
+
+
+socketcand.connect_to_server = _connect
 
 
 def make(address: str, config: AdapterConfig) -> Adapter:  # noqa: ARG001 # every kind is made alike

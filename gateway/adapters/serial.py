@@ -81,7 +81,7 @@ class SerialAdapter:
             _hurry(line)
             _keep_alive(line)
         except (OSError, ValueError) as error:
-            raise GatewayError(f"serial line {self.address}: {MENDS.get(_number(error), error)}") from error
+            raise GatewayError(f"serial line {self.address}: {MENDS.get(error_number(error), error)}") from error
         return SerialPort(line, telnet=telnet)
 
 
@@ -100,9 +100,9 @@ def _keep_alive(line: Any) -> None:
             peer.setsockopt(socket.IPPROTO_TCP, option, value)
 
 
-def _number(error: Exception) -> int:
-    """The errno, which pyserial may have left in what it caught."""
-    causes = (error.args, error.__context__.args if error.__context__ else ())
+def error_number(error: BaseException | None) -> int:
+    """The errno, which pyserial may have left in what it caught; 0 if there is none."""
+    causes = (error.args, error.__context__.args if error.__context__ else ()) if error else ()
     return next((args[0] for args in causes if args and isinstance(args[0], int)), 0)
 
 

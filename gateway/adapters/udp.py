@@ -35,6 +35,7 @@ class UdpPort:
         self._senders = senders
         self._overflows = Overflows(line)
         self._strangers: set[str] = set()
+        self._sender: tuple[str, int] | None = None
 
     def read(self) -> Reading:
         """The datagrams that have come, up to 512."""
@@ -47,6 +48,8 @@ class UdpPort:
                 if self._senders and sender[0] not in self._senders:
                     remark = remark or self._refused(sender[0])
                     continue
+                if sender != self._sender:
+                    remark = remark or self._another(sender)
                 chunk += HEAD.pack(time.monotonic_ns(), len(data)) + data
                 count += 1
         return Reading(bytes(chunk), count, self._overflows.new(), remark)
@@ -54,6 +57,15 @@ class UdpPort:
     def close(self) -> None:
         """Close the socket."""
         self._line.close()
+
+    def _another(self, sender: tuple[str, int]) -> str:
+        """What to say of a sender that is not the one before it, once."""
+        before, self._sender = self._sender, sender
+        name = "{}:{}".format(*sender)
+        if before is None or name in self._strangers or len(self._strangers) >= MOST_AT_ONCE:
+            return ""
+        self._strangers |= {name, "{}:{}".format(*before)}
+        return f"datagrams come from {name}, before from {before[0]}:{before[1]}: give each bridge a port of its own"
 
     def _refused(self, sender: str) -> str:
         """What to say of a sender, once."""

@@ -7,7 +7,7 @@ from simulators import carriers
 from simulators.carriers import Carrier
 from simulators.outlets import FileOutlet, PtyOutlet, SlcanOutlet, TcpOutlet, UdpOutlet
 
-FORMS = "pty, tcp:PORT, file:PATH, udp:HOST:PORT, slcan or can:INTERFACE:CHANNEL; the last two take ?fd=true"
+FORMS = "pty, pty:LINK, tcp:PORT, file:PATH, udp:HOST:PORT, slcan or can:INTERFACE:CHANNEL; the last two take ?fd=true"
 FD = "?fd=true"
 LAST_PORT = 65_535
 
@@ -27,8 +27,8 @@ def named(text: str) -> Way:
     fd = text.startswith(("slcan", "can:")) and text.endswith(FD)
     kind, _, address = (text.removesuffix(FD) if fd else text).partition(":")
     match kind:
-        case "pty" if not address:
-            return Way(PtyOutlet(), carriers.stream())
+        case "pty":
+            return Way(PtyOutlet(_link(address)), carriers.stream())
         case "tcp":
             return Way(TcpOutlet(_port(address or "0")), carriers.stream())
         case "file" if address:
@@ -44,6 +44,14 @@ def named(text: str) -> Way:
             interface, _, channel = address.partition(":")
             return Way(CanOutlet(interface, channel, fd), carriers.can(fd))
     raise ValueError(f"use {FORMS}")
+
+
+def _link(text: str) -> Path | None:
+    """A name for a terminal; one that something else has is refused, as it would be replaced."""
+    link = Path(text) if text else None
+    if link and link.exists() and not link.is_symlink():
+        raise ValueError(f"{link} is there already and no link of ours: choose another name")
+    return link
 
 
 def _port(text: str) -> int:

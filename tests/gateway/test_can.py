@@ -145,7 +145,8 @@ def test_an_address_that_cannot_be_one_is_refused_with_what_to_write(address: st
 @pytest.mark.parametrize(
     ("source", "complaint"),
     [
-        ("slcan:/dev/nowhere", "can slcan:/dev/nowhere: .*No such file"),
+        ("slcan:/dev/nowhere", "can slcan:/dev/nowhere: no such device: plug it in"),
+        ("socketcand:can0?host=127.0.0.1&port=1", "can socketcand:can0: connection refused: start socketcand there"),
         ("socketcan:can99", "can can99: (no such interface|this kernel has no CAN)"),
         ("slcan:/dev/null?bitrate=7", "can slcan:/dev/null: .*"),
     ],

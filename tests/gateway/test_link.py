@@ -106,6 +106,53 @@ def test_what_a_bridge_says_that_it_sent_and_did_not_arrive_is_lost_on_the_link(
     assert link.take_losses() == told
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "lost"),
+    [
+        ((100, 0), (20, 0), 0),
+        ((100, 0), (105, 0), 60),
+        ((0, 100), (45, 3), 0),
+    ],
+    ids=["clean", "lost on the link", "lost in the bridge"],
+)
+def test_the_counts_of_a_bridge_that_begins_anew_go_on_from_zero(
+    before: tuple[int, int], after: tuple[int, int], lost: int
+) -> None:
+    link = count(make(), 0, 1000, 1001)
+    link.heartbeat((ChannelCount(1, 0, 0),))
+    link.books[1].arrived = before[0]
+    link.heartbeat((ChannelCount(1, *before),))
+    count(link, 0, flags=f.FLAG_PARITY)
+    link.books[1].arrived += after[0] - lost
+    link.heartbeat((ChannelCount(1, *after),))
+    counters = link.all_counters()
+    assert counters["channel_1.words_lost_on_link"] == lost
+    assert counters["channel_1.words_lost_in_bridge"] == before[1] + after[1]
+
+
+def test_a_bridge_on_can_that_begins_anew_shows_by_its_clock_and_its_counts() -> None:
+    link = Link(AdapterConfig(name="bridge", source="can:virtual:a"), load_profile("arinc708"))
+
+    def say(sequence: int, time_s: int, arrived: int, received: int) -> None:
+        link.count(Packet(f.WORDS_429, 1, 0, sequence, time_s * 10**9, b""))
+        link.books[1].arrived += arrived
+        link.heartbeat((ChannelCount(1, received, 0),))
+
+    say(0, 100, 0, 500)
+    say(1, 110, 400, 900)
+    say(2, 1, 20, 70)
+    assert link.all_counters()["channel_1.words_lost_on_link"] == 50
+    say(3, 2, 30, 100)
+    assert link.all_counters()["channel_1.words_lost_on_link"] == 50
+
+
+def test_several_packets_may_be_overtaken_by_one() -> None:
+    link = make()
+    packets = [Packet(f.HEARTBEAT, 0, 0, k, 1000 * k, b"") for k in (0, 4, 1, 2, 3, 5)]
+    assert all(link.count(packet) for packet in packets)
+    assert (link.counters["packets_late"], link.counters["packets_lost"]) == (3, 0)
+
+
 def test_a_packet_that_others_have_overtaken_is_not_lost() -> None:
     link = make()
     packets = [Packet(f.HEARTBEAT, 0, 0, k, 1000 * k, b"") for k in (0, 1, 3, 4, 2, 5)]

@@ -165,9 +165,9 @@ def test_a_name_gives_an_outlet_and_how_packets_are_carried_to_it(name: str, pla
     assert way.carrier.name == carrier
 
 
-@pytest.mark.parametrize("name", ["", "tin", "pty:x", "pty?fd=true", "file", "udp:9", "udp:host:x", "slcan:x", "can:a"])
+@pytest.mark.parametrize("name", ["", "tin", "pty?fd=true", "file", "udp:9", "udp:host:x", "slcan:x", "can:a"])
 def test_a_name_without_an_outlet_is_refused_with_what_there_is(name: str) -> None:
-    with pytest.raises(ValueError, match=r"^use pty, tcp:PORT|is no port"):
+    with pytest.raises(ValueError, match=r"^use pty, pty:LINK|is no port"):
         named(name)
 
 
@@ -241,3 +241,14 @@ def test_stop_ends_the_playing_at_once() -> None:
 def test_a_speed_of_nought_is_refused() -> None:
     with pytest.raises(ValueError, match="speed"):
         play([], Clocked(), speed=0.0)
+
+
+def test_a_terminal_takes_no_name_that_something_else_has(tmp_path: Path) -> None:
+    link = tmp_path / "bridge"
+    with named(f"pty:{link}").outlet as outlet:
+        assert (outlet.place, link.is_symlink()) == (f"serial:{link}", True)
+    assert not link.exists()
+    link.write_text("mine")
+    with pytest.raises(ValueError, match="bridge is there already and no link of ours"):
+        named(f"pty:{link}")
+    assert link.read_text() == "mine"
