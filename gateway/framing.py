@@ -17,6 +17,7 @@ class Form(NamedTuple):
     framer: Callable[[], PacketFramer]
     unit: str
     advice: str  # where something comes, and no packet
+    checked: bool = True  # whether a checksum, ours or CAN's, keeps altered words out
 
 
 SPEAKS = "check the baud rate and that the bridge speaks RackLink"
@@ -27,8 +28,8 @@ DATAGRAMS = {
     "bare708": Form(BareFramer, "datagrams", "check that each datagram is one radar word"),
 }
 CAN_TEXTS = {
-    "slcan": Form(lambda: CanFramer(Slcan()), "bytes", FRAMES),
-    "socketcand": Form(lambda: CanFramer(Socketcand()), "bytes", FRAMES),
+    "slcan": Form(lambda: CanFramer(Slcan()), "bytes", FRAMES, checked=False),
+    "socketcand": Form(lambda: CanFramer(Socketcand()), "bytes", FRAMES, checked=False),
 }
 CAN = Form(lambda: CanFramer(Recorded()), "frames", FRAMES)
 

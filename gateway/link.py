@@ -94,6 +94,7 @@ class Link:
     def __post_init__(self) -> None:
         form = form_of(self.config)
         self.framer, self._unit, self.advice = form.framer(), form.unit, form.advice
+        self._checked = form.checked
         for number, channel in self.config.channels.items():
             if channel.kind == "arinc708":
                 self.channels[number] = Channel708(
@@ -182,7 +183,7 @@ class Link:
         self._recent.append(packet)
         self.counters["packets"] += 1
         if packet.type in (f.WORDS_429, f.WORD_708):
-            self._clock_went_back |= packet.time_ns < self._latest_ns - GOES_BACK_NS
+            self._clock_went_back |= self._checked and packet.time_ns < self._latest_ns - GOES_BACK_NS
             self._latest_ns = packet.time_ns
         for bit, name in FLAG_NAMES.items():
             if packet.flags & bit:

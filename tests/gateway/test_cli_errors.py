@@ -151,7 +151,7 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
     ),
     "unknown outlet": (
         lambda d: ["simulate", "--to", "tin"],
-        ("--to tin: use pty, tcp:PORT, file:PATH, udp:",),
+        ("--to tin: use pty, pty:LINK, tcp:PORT, file:PATH, udp:",),
     ),
 }
 

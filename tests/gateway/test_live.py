@@ -108,7 +108,7 @@ def test_a_line_that_is_cut_inside_a_packet_comes_back_and_the_loss_is_told(
             live.wait_for_bytes(len(stream) - 300)
     assert recorded_bytes(live.path) == stream[:cut] + stream[cut + 300 :]
     states = [event["state"] for event in live.events("status", adapter="bridge")]
-    assert states == ["OPENING", "UP", "LOST", "OPENING", "UP", "CLOSED"]
+    assert states == ["OPENING", "UP", "LOST", "OPENING", "UP", "LOSS", "CLOSED"]
     assert live.events("summary")[0]["counters"]["bridge.packets_lost"] > 0
     reasons = [reason for event in live.events("integrity") for reason in event["reasons"]]
     assert sum("degraded: bridge LOST" in reason for reason in reasons) == 1
