@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
 from numba import njit, types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from decoders import formats as f
@@ -37,7 +38,8 @@ FIRST_SPARE: Final = f.UNUSUAL_708.index(next(iter(f.SPARE_708)))
 RESERVED_LEVEL: Final = 1 << f.UNUSUAL_708.index("reserved_level")
 TILT_LSB_DEG: Final = f.TILT_LSB_DEG
 SCAN_ANGLE_LSB_DEG: Final = f.SCAN_ANGLE_LSB_DEG
-BYTES_AT_ONCE: Final = 24  # of the wire: 64 bins of 3 bits or 32 of 6
+BYTES_AT_ONCE: Final = 12  # of the wire: 32 bins of 3 bits or 16 of 6
+LOADED: Final = 16  # bytes for half of them, with some before: one register
 WORDS_AT_ONCE: Final = 1024  # headers that stay in the nearest cache while each field passes over them
 
 
@@ -63,25 +65,19 @@ def headers(words: Bytes, meanings: Meanings, header: Header) -> None:
         zero, sense = meanings.scan_angle_zero, meanings.scan_angle_sense
         _angle(bits, SCAN_ANGLE, zero, sense, SCAN_ANGLE_LSB_DEG, header.scan_angle_deg[first:end])
         _unusual(header.label[first:end], header.mode[first:end], meanings, header.unusual[first:end])
-        for k in range(len(SPARES)):
-            _spare(bits, SPARES[k], FIRST_SPARE + k, header.unusual[first:end])
+        _spares(bits, header.unusual[first:end])
 
 
 @njit(cache=True)
 def unpack_bins(words: Bytes, bits_per_bin: int, reserved_level: int, bins: Bytes, unusual: Bytes) -> None:
-    """Fill the bins of each word, 64 or more of 3 or 6 bits, and flag the words that hold a reserved level."""
+    """Fill the bins of each word, 32 or more of 3 or 6 bits, and flag the words that hold a reserved level."""
     level = np.uint8(reserved_level)
-    at_once = BYTES_AT_ONCE * 8 // bits_per_bin
     for i in range(words.shape[0]):
-        found = np.uint64(0)
-        for start in range(0, bins.shape[1], at_once):
-            first = min(start, bins.shape[1] - at_once)  # the last ones reach back
-            byte = HEADER_BYTES + first * bits_per_bin // 8
-            if bits_per_bin == 3:
-                found |= _spread(3, words[i], byte, bins[i], first, level)
-            else:
-                found |= _spread(6, words[i], byte, bins[i], first, level)
-        unusual[i] |= (found != 0) * RESERVED_LEVEL
+        if bits_per_bin == 3:
+            found = _spread(3, words[i], bins[i], level)
+        else:
+            found = _spread(6, words[i], bins[i], level)
+        unusual[i] |= found * RESERVED_LEVEL
 
 
 @njit(cache=True)
@@ -121,7 +117,7 @@ def _angle(bits: Array, place: Place, zero: int, sense: int, lsb_deg: float, val
     width = place[1]
     for i in range(values.size):
         code = (zero + sense * _field(bits[i], place)) & ((1 << width) - 1)
-        values[i] = (code - ((code >> (width - 1)) << width)) * lsb_deg
+        values[i] = np.int32(code - ((code >> (width - 1)) << width)) * lsb_deg  # 32 bits become floats at once
 
 
 @njit(cache=True)
@@ -141,48 +137,66 @@ def _unusual(labels: Array, modes: Array, meanings: Meanings, unusual: Array) ->
 
 
 @njit(cache=True)
-def _spare(bits: Array, place: Place, flag: int, unusual: Array) -> None:
+def _spares(bits: Array, unusual: Array) -> None:
     for i in range(unusual.size):
-        unusual[i] |= (_field(bits[i], place) != 0) << flag
+        for k in range(len(SPARES)):
+            unusual[i] |= (_field(bits[i], SPARES[k]) != 0) << (FIRST_SPARE + k)
 
 
-def _spread_24(_context: Any, width: Any, word: Any, byte: Any, bins: Any, first: Any, level: Any) -> Any:
-    """Bins of `width` bits, 3 or 6, from 24 bytes at word[byte:] to bins[first:], one a byte; a bit for each `level`.
+def _spread_word(_context: Any, width: Any, word: Any, bins: Any, level: Any) -> Any:
+    """Bins of `width` bits, 3 or 6, from a word, one a byte; whether any of them is `level`.
 
-    Each pair of bins lies in two neighbouring bytes: shuffle those into a 16-bit lane, shift the pair to its foot, and
-    move its upper half to the upper byte. The compiler finds no shuffle in a loop, which takes twice as long.
+    A step takes 12 bytes, as two halves of 6. Each pair of bins lies in two neighbouring bytes and ends in the second:
+    shuffle those into a 16-bit lane, shift the pair to its foot, and fill the upper byte from the pair moved up until
+    its second bin stands there. The compiler finds no shuffle in a loop, which takes twice as long.
     """
     bits = width.literal_value
-    count = BYTES_AT_ONCE * 8 // bits
-    before = HEADER_BYTES  # loaded too: with them it is one register, and they are there before the first bin
+    at_once = BYTES_AT_ONCE * 8 // bits
+    upper = [(2 * bits * (pair + 1) - 1) // 8 for pair in range(at_once // 2)]  # the byte where each pair ends
+    shift = [2 * bits * pair - 8 * (byte - 1) for pair, byte in enumerate(upper)]
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        source, target = (context.make_array(signature.args[k])(context, builder, arguments[k]).data for k in (1, 3))
-        i8, i16, i32, i64 = (ir.IntType(size) for size in (8, 16, 32, 64))
-        packed, lanes = ir.VectorType(i8, before + BYTES_AT_ONCE), ir.VectorType(i16, count // 2)
-        spread, indices = ir.VectorType(i8, count), ir.VectorType(i32, count)
+        source, target = (context.make_array(signature.args[k])(context, builder, arguments[k]) for k in (1, 2))
+        length = builder.extract_value(target.shape, 0)
+        i8, i16, i32, count = ir.IntType(8), ir.IntType(16), ir.IntType(32), length.type
+        loaded, lanes, spread = ir.VectorType(i8, LOADED), ir.VectorType(i16, at_once // 2), ir.VectorType(i8, at_once)
+        found = cgutils.alloca_once_value(builder, ir.Constant(spread, None))
+        one = builder.insert_element(ir.Constant(spread, ir.Undefined), arguments[3], i32(0))
+        every = _shuffled(builder, one, one, [0] * at_once)
+        # Where a byte is in both halves once they are loaded, the first from the start of the word, the other 4 on.
+        half = len(upper) // 2
+        pick = [byte + k + (HEADER_BYTES if n < half else LOADED + 4) for n, byte in enumerate(upper) for k in (-1, 0)]
 
-        def constant(*lane_values: int) -> Any:
-            return ir.Constant(lanes, lane_values * (count // 2 // len(lane_values)))
+        def step(byte: Any, first: Any) -> None:
+            start = builder.gep(source.data, [byte])
+            places = (start, builder.gep(start, [count(4)]))
+            halves = (builder.load(builder.bitcast(place, loaded.as_pointer()), align=1) for place in places)
+            pairs = builder.bitcast(_shuffled(builder, *halves, pick), lanes)
+            near = builder.lshr(pairs, ir.Constant(lanes, shift))
+            far = builder.shl(near, ir.Constant(lanes, [8 - bits] * len(shift)))
+            upper_from_far = [k + at_once * (k % 2) for k in range(at_once)]
+            both = _shuffled(builder, builder.bitcast(near, spread), builder.bitcast(far, spread), upper_from_far)
+            result = builder.and_(both, ir.Constant(spread, [2**bits - 1] * at_once))
+            place = builder.bitcast(builder.gep(target.data, [first]), spread.as_pointer())
+            builder.store(result, place, align=1)
+            equal = builder.sext(builder.icmp_unsigned("==", result, every), spread)
+            builder.store(builder.or_(builder.load(found), equal), found)
 
-        pairs = [divmod(2 * bits * pair, 8) for pair in range(count // 2)]  # byte and bit where each begins
-        pick = [before + min(at + k, BYTES_AT_ONCE - 1) for at, _ in pairs for k in (0, 1)]
-        start = builder.sub(arguments[2], ir.Constant(arguments[2].type, before))
-        place = builder.bitcast(builder.gep(source, [start]), packed.as_pointer())
-        loaded = builder.load(place, align=1)
-        pair = builder.bitcast(builder.shuffle_vector(loaded, loaded, ir.Constant(indices, pick)), lanes)
-        pair = builder.lshr(pair, constant(*(bit for _, bit in pairs)))
-        near = builder.and_(pair, constant(2**bits - 1))
-        far = builder.and_(builder.shl(pair, constant(8 - bits)), constant((2**bits - 1) << 8))
-        result = builder.bitcast(builder.or_(near, far), spread)
-        place = builder.bitcast(builder.gep(target, [arguments[4]]), spread.as_pointer())
-        builder.store(result, place, align=1)
-        one = builder.insert_element(ir.Constant(spread, ir.Undefined), arguments[5], i32(0))
-        every = builder.shuffle_vector(one, one, ir.Constant(indices, None))
-        found = builder.bitcast(builder.icmp_unsigned("==", result, every), ir.IntType(count))
-        return builder.zext(found, i64) if count < i64.width else found
+        steps = builder.udiv(length, count(at_once))
+        with cgutils.for_range(builder, steps) as loop:
+            step(builder.mul(loop.index, count(BYTES_AT_ONCE)), builder.mul(loop.index, count(at_once)))
+        with builder.if_then(builder.icmp_unsigned("!=", builder.mul(steps, count(at_once)), length)):
+            last = builder.sub(length, count(at_once))  # the last ones reach back
+            step(builder.udiv(builder.mul(last, count(bits)), count(8)), last)
+        whole = builder.bitcast(builder.load(found), ir.IntType(8 * at_once))
+        return builder.zext(builder.icmp_unsigned("!=", whole, whole.type(0)), i8)
 
-    return types.uint64(width, word, byte, bins, first, level), generate
+    return types.uint8(width, word, bins, level), generate
 
 
-_spread: Any = intrinsic(prefer_literal=True)(_spread_24)
+def _shuffled(builder: Any, one: Any, other: Any, pick: list[int]) -> Any:
+    """A vector of the elements of two others that `pick` names."""
+    return builder.shuffle_vector(one, other, ir.Constant(ir.VectorType(ir.IntType(32), len(pick)), pick))
+
+
+_spread: Any = intrinsic(prefer_literal=True)(_spread_word)
