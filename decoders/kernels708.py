@@ -73,10 +73,8 @@ def unpack_bins(words: Bytes, bits_per_bin: int, reserved_level: int, bins: Byte
     """Fill the bins of each word, 32 or more of 3 or 6 bits, and flag the words that hold a reserved level."""
     level = np.uint8(reserved_level)
     for i in range(words.shape[0]):
-        if bits_per_bin == 3:
-            found = _spread(3, words[i], bins[i], level)
-        else:
-            found = _spread(6, words[i], bins[i], level)
+        word, row = words[i], bins[i]
+        found = _spread(3, word, row, level) if bits_per_bin == 3 else _spread(6, word, row, level)
         unusual[i] |= found * RESERVED_LEVEL
 
 
@@ -160,7 +158,8 @@ def _spread_word(_context: Any, width: Any, word: Any, bins: Any, level: Any) ->
         length = builder.extract_value(target.shape, 0)
         i8, i16, i32, count = ir.IntType(8), ir.IntType(16), ir.IntType(32), length.type
         loaded, lanes, spread = ir.VectorType(i8, LOADED), ir.VectorType(i16, at_once // 2), ir.VectorType(i8, at_once)
-        found = cgutils.alloca_once_value(builder, ir.Constant(spread, None))
+        found = cgutils.alloca_once(builder, spread)  # type: ignore[no-untyped-call] # numba leaves it so
+        builder.store(ir.Constant(spread, None), found)
         one = builder.insert_element(ir.Constant(spread, ir.Undefined), arguments[3], i32(0))
         every = _shuffled(builder, one, one, [0] * at_once)
         # Where a byte is in both halves once they are loaded, the first from the start of the word, the other 4 on.
@@ -170,8 +169,8 @@ def _spread_word(_context: Any, width: Any, word: Any, bins: Any, level: Any) ->
         def step(byte: Any, first: Any) -> None:
             start = builder.gep(source.data, [byte])
             places = (start, builder.gep(start, [count(4)]))
-            halves = (builder.load(builder.bitcast(place, loaded.as_pointer()), align=1) for place in places)
-            pairs = builder.bitcast(_shuffled(builder, *halves, pick), lanes)
+            low, high = (builder.load(builder.bitcast(place, loaded.as_pointer()), align=1) for place in places)
+            pairs = builder.bitcast(_shuffled(builder, low, high, pick), lanes)
             near = builder.lshr(pairs, ir.Constant(lanes, shift))
             far = builder.shl(near, ir.Constant(lanes, [8 - bits] * len(shift)))
             upper_from_far = [k + at_once * (k % 2) for k in range(at_once)]
