@@ -55,9 +55,9 @@ class _Rates:
         self.count += came
         self.ever += came
 
-    def judged(self, label: int) -> None:
-        """What came so far is judged."""
-        self.first_ns[label], self.count[label] = self.last_ns[label], 1
+    def judged(self, labels: int | npt.NDArray[np.bool_]) -> None:
+        """What came so far of a label, or of those of a mask (256,), is judged."""
+        self.first_ns[labels], self.count[labels] = self.last_ns[labels], 1
 
 
 class BusHealth:
@@ -71,6 +71,10 @@ class BusHealth:
         self.has_sdi = np.isin(np.arange(256), [label for label, row in definitions.labels.items() if row.has_sdi])
         self._sources = np.zeros((256, 4), np.bool_)  # by label and SDI, whether this second had such a word
         self._is_known = np.isin(np.arange(256), list(definitions.labels))
+        intervals = [definitions.labels[k].interval_ms if self._is_known[k] else None for k in range(256)]
+        self._shortest_ms = np.array([given[0] if given else 0.0 for given in intervals])
+        self._longest_ms = np.array([(given[1] if given else None) or np.inf for given in intervals])
+        self._told = np.zeros(256, np.bool_)  # by label, whether something is told of it that is not over
         self._rates = _Rates()
         self._wrong: set[str] = set()
         self._second_ns: int | None = None  # when the current second began
@@ -80,12 +84,29 @@ class BusHealth:
     def feed(
         self, time_ns: npt.NDArray[np.int64], words: npt.NDArray[np.uint32], values: Values429
     ) -> Iterator[Finding]:
-        """Take one decoded block (n,) with the device times of its words; give what has changed."""
-        now_ns = int(time_ns[-1])
-        if self._second_ns is None or now_ns < self._second_ns:  # the first word, or a clock that began anew
-            self._second_ns = int(time_ns[0])
-            self._rates = _Rates()
-            self._words = -1  # its first word opens the second and is not of it
+        """Take one decoded block (n,) with the device times of its words in order; give what has changed.
+
+        A second is judged at its last word, so it does not matter how the words are cut into blocks.
+        """
+        start = 0
+        while start < len(time_ns):
+            if self._second_ns is None or time_ns[start] < self._second_ns:  # the first word, or a clock begun anew
+                self._second_ns = int(time_ns[start])
+                self._rates = _Rates()
+                self._words = -1  # its first word opens the second and is not of it
+            end = int(np.searchsorted(time_ns[start:], self._second_ns + SECOND_NS)) + start + 1
+            part = slice(start, end)
+            yield from self._count(
+                time_ns[part], words[part], Values429(values.label[part], values.value[part], values.status[part])
+            )
+            if end <= len(time_ns):
+                yield from self._judge(int(time_ns[end - 1]))
+            start = end
+
+    def _count(
+        self, time_ns: npt.NDArray[np.int64], words: npt.NDArray[np.uint32], values: Values429
+    ) -> Iterator[Finding]:
+        """Take words of one second; what a box says of itself is judged at once."""
         good = values.status != Status.BAD_PARITY
         labels = values.label[good]
         self._words += len(values.label)
@@ -100,8 +121,6 @@ class BusHealth:
         for said in values.value[(values.label == EQUIPMENT) & (values.status == Status.NORMAL)].astype(int).tolist():
             reason = f"the box says it is equipment {said:03X}, it is read as {self._definitions.name}"
             yield from self._tell("equipment", said & 0xFF != self._definitions.equipment_id & 0xFF, reason)
-        if now_ns - self._second_ns >= SECOND_NS:
-            yield from self._judge(now_ns)
 
     def _judge(self, now_ns: int) -> Iterator[Finding]:
         load = self._words * SECOND_NS / (now_ns - (self._second_ns or 0))
@@ -109,8 +128,10 @@ class BusHealth:
         most = MOST_WORDS_PER_S[self._speed]
         reason = f"{load:.0f} words/s, a {self._speed} speed bus carries {most:.1f} at most"
         yield from self._tell("load", load > OVERLOAD * most, reason)
-        for label in np.flatnonzero(self._rates.ever).tolist():
+        in_order = self._in_order(now_ns)
+        for label in np.flatnonzero((self._rates.ever > 0) & ~in_order).tolist():
             yield from self._rate(label, now_ns)
+        self._rates.judged(in_order & (self._rates.count > 1))
         if self._known["good"] + self._known["bad parity"] >= ENOUGH_WORDS:
             yield from self._reading()
         several = np.flatnonzero(self._sources[:, 1:].sum(axis=1) > 1)
@@ -120,25 +141,34 @@ class BusHealth:
         self._sources[:] = False
         self._second_ns, self._words = now_ns, 0
 
+    def _in_order(self, now_ns: int) -> npt.NDArray[np.bool_]:
+        """By label (256,), whether there is clearly nothing to tell of it: neither anything new, nor an end."""
+        rates = self._rates
+        mean_ms = (rates.last_ns - rates.first_ns) / 1e6 / np.maximum(rates.count - 1, 1)
+        kept = (mean_ms >= TOO_FAST[1] * self._shortest_ms) & (mean_ms <= TOO_SLOW[1] * self._longest_ms)
+        silent_ms = (now_ns - rates.last_ns) / 1e6
+        heard = (silent_ms <= STOPPED * self._longest_ms) | (silent_ms <= SECOND_NS / 1e6)
+        return ~self._told & (kept | (rates.count < 2)) & heard
+
     def _rate(self, label: int, now_ns: int) -> Iterator[Finding]:
         rates = self._rates
-        definition = self._definitions.labels.get(label)
-        shortest, longest = definition.interval_ms if definition and definition.interval_ms else (0.0, None)
-        if rates.count[label] > 1 and f"label {label:03o}" in self._wrong:  # the gap that was told is no interval
+        shortest, longest = float(self._shortest_ms[label]), float(self._longest_ms[label])
+        stopped, fast, slow = (f"{what}{label:03o}" for what in ("label ", "rate of ", "slowness of "))
+        if rates.count[label] > 1 and stopped in self._wrong:  # the gap that was told is no interval
             rates.judged(label)
         if rates.count[label] > 1:
             mean_ms = float(rates.last_ns[label] - rates.first_ns[label]) / 1e6 / (rates.count[label] - 1)
             said = f"label {label:03o} comes every {mean_ms:.1f} ms"
             wrong = _beyond(-mean_ms, -TOO_FAST[0] * shortest, -TOO_FAST[1] * shortest)
-            yield from self._tell(f"rate of {label:03o}", wrong, f"{said}, {shortest:g} is the shortest interval")
-            if longest:
-                wrong = _beyond(mean_ms, TOO_SLOW[0] * longest, TOO_SLOW[1] * longest)
-                yield from self._tell(f"slowness of {label:03o}", wrong, f"{said}, {longest:g} is the longest interval")
+            yield from self._tell(fast, wrong, f"{said}, {shortest:g} is the shortest interval")
+            wrong = _beyond(mean_ms, TOO_SLOW[0] * longest, TOO_SLOW[1] * longest)
+            yield from self._tell(slow, wrong, f"{said}, {longest:g} is the longest interval")
             rates.judged(label)
-        if longest and rates.ever[label] >= OFTEN:
+        if rates.ever[label] >= OFTEN:
             silent_ms = (now_ns - int(rates.last_ns[label])) / 1e6
-            stopped = f"label {label:03o} has not come for {silent_ms:.0f} ms, {longest:g} is the longest interval"
-            yield from self._tell(f"label {label:03o}", silent_ms > max(STOPPED * longest, 1000.0), stopped)
+            reason = f"label {label:03o} has not come for {silent_ms:.0f} ms, {longest:g} is the longest interval"
+            yield from self._tell(stopped, silent_ms > max(STOPPED * longest, SECOND_NS / 1e6), reason)
+        self._told[label] = bool({stopped, fast, slow} & self._wrong)
 
     def _reading(self) -> Iterator[Finding]:
         good, bad = self._known["good"], self._known["bad parity"]

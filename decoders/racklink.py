@@ -7,7 +7,7 @@ body is not what its type says, so that the caller can count it; its bytes stay 
 import re
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, ClassVar, Final, Literal, NamedTuple
 
@@ -23,12 +23,14 @@ __all__ = [
     "Framer",
     "Hello",
     "HelloChannel",
+    "Joined",
     "MalformedBody",
     "Packet",
     "RadarWord",
     "TimedWords",
     "heartbeat",
     "hello",
+    "joined429",
     "parsed",
     "radar_word",
     "time_mark",
@@ -56,6 +58,19 @@ class TimedWords(NamedTuple):
     words: npt.NDArray[np.uint32]
     leftover_bytes: int  # after the last whole entry
     well_formed: bool  # 1 to 256 entries and nothing left over
+
+
+class Joined(NamedTuple):
+    """The ARINC 429 words of many packets, those of packets that run backwards left out.
+
+    `time_ns` i8 (n,) device clock, `words` u4 (n,), `packet` i8 (n,) the index of the packet that each came in.
+    """
+
+    time_ns: npt.NDArray[np.int64]
+    words: npt.NDArray[np.uint32]
+    packet: npt.NDArray[np.int64]
+    malformed: int  # packets that are not 1 to 256 whole entries in order of time
+    left_out: int  # words
 
 
 class RadarWord(NamedTuple):
@@ -224,6 +239,27 @@ def words429(packet: Packet) -> TimedWords:
     entries = np.frombuffer(packet.body, ENTRY_429, count)
     time_ns = entries["offset_ns"] + np.int64(packet.time_ns)
     return TimedWords(time_ns, entries["word"], leftover, leftover == 0 and 1 <= count <= f.LINK_MAX_WORDS)
+
+
+def joined429(packets: Sequence[Packet]) -> Joined:
+    """The words of several ARINC 429 packets whose device times are within 292 years, as one block."""
+    bodies = [packet.body for packet in packets]
+    sizes = np.array([len(body) for body in bodies])
+    counts = sizes // ENTRY_429.itemsize
+    if (counts * ENTRY_429.itemsize != sizes).any():
+        bodies = [body[: len(body) // ENTRY_429.itemsize * ENTRY_429.itemsize] for body in bodies]
+    entries = np.frombuffer(b"".join(bodies), ENTRY_429)
+    packet = np.repeat(np.arange(len(packets)), counts)
+    time_ns = np.array([packet.time_ns for packet in packets], np.int64)[packet] + entries["offset_ns"]
+    words = entries["word"].copy()
+    wrong = (counts * ENTRY_429.itemsize != sizes) | (counts < 1) | (counts > f.LINK_MAX_WORDS)
+    back = (np.diff(time_ns) < 0) & (np.diff(packet) == 0)
+    if not back.any():
+        return Joined(time_ns, words, packet, int(wrong.sum()), 0)
+    backwards = np.isin(np.arange(len(packets)), packet[1:][back])
+    kept = ~backwards[packet]
+    left_out = len(words) - int(kept.sum())
+    return Joined(time_ns[kept], words[kept], packet[kept], int((wrong | backwards).sum()), left_out)
 
 
 def radar_word(packet: Packet) -> RadarWord:

@@ -2,20 +2,18 @@
 
 from collections import Counter, defaultdict, deque
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from decoders import arinc429, control708
 from decoders import formats as f
-from decoders.arinc429 import JoinRule
 from decoders.definitions import Definitions, for_equipment, load_definitions
 from decoders.framing import Packet, PacketFramer
 from decoders.health429 import EQUIPMENT, BusHealth
 from decoders.profiles import Profile
 from decoders.racklink import ChannelCount, Hello, words429
 from gateway.books import Books
+from gateway.channels import Channel429, Channel708
 from gateway.config import AdapterConfig, definitions_of, profile_of
 from gateway.framing import form_of
 from monitor.utc import TIME, UTC_LABELS
@@ -31,47 +29,6 @@ FLAG_NAMES = {
     f.FLAG_SYNC: "sync_error",
 }
 SPOILT = f.FLAG_CODING | f.FLAG_WORD_LENGTH | f.FLAG_SYNC  # words whose bits cannot be trusted
-
-
-@dataclass(frozen=True)
-class Channel429:
-    """An ARINC 429 channel: how to read its labels, when their values were true, and how well the bus behaves."""
-
-    definitions: Definitions
-    health: BusHealth
-    kind: int
-    is_panel: bool
-    orientation: str
-    join_rule: JoinRule
-    sdi: int | None
-    delays_ns: NDArray[np.int64]  # (256,), by label
-
-    packet_type: ClassVar[int] = f.WORDS_429
-
-    def reads(self, definitions: Definitions, orientation: str, kind: int) -> bool:
-        """Whether it is read in this way already."""
-        return (self.definitions, self.orientation, self.kind) == (definitions, orientation, kind)
-
-    def uses(self, words: NDArray[np.uint32], labels: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Which words (n,) come from the source that is to be used, as bits 9 and 10 say where they are no data."""
-        sdi = words >> np.uint32(8) & np.uint32(3)
-        if self.sdi is None:
-            return np.ones(len(words), np.bool_)
-        return np.asarray((sdi == 0) | (sdi == self.sdi) | ~self.health.has_sdi[labels])
-
-    @property
-    def role(self) -> str:
-        """What only one channel can be at a time."""
-        return f"source of equipment {self.definitions.equipment_id & 0xFF:02X}"
-
-
-@dataclass(frozen=True)
-class Channel708:
-    """An ARINC 708 channel."""
-
-    profile: Profile
-    packet_type: ClassVar[int] = f.WORD_708
-    role: ClassVar[str] = "radar"
 
 
 @dataclass
@@ -177,7 +134,7 @@ class Link:
         The very same packet once more, as a network may deliver it, is counted and must not be used again. One that
         others have overtaken is not lost after all.
         """
-        if packet in self._recent:
+        if packet.sequence != self._next_sequence and packet in self._recent:
             self.counters["packets_repeated"] += 1
             return False
         self._recent.append(packet)
@@ -185,11 +142,8 @@ class Link:
         if packet.type in (f.WORDS_429, f.WORD_708):
             self._clock_went_back |= self._checked and packet.time_ns < self._latest_ns - GOES_BACK_NS
             self._latest_ns = packet.time_ns
-        for bit, name in FLAG_NAMES.items():
-            if packet.flags & bit:
-                self.counters[name] += 1
-        if packet.flags & f.FLAG_FIFO_OVERFLOW:
-            self.losses["overflows in the bridge"] += 1
+        if packet.flags:
+            self._count_flags(packet.flags)
         if self._next_sequence is not None:
             gap = (packet.sequence - self._next_sequence) % SEQUENCE_RANGE
             if gap < SEQUENCE_RANGE // 2:
@@ -205,6 +159,13 @@ class Link:
                     books.restart()
         self._next_sequence = (packet.sequence + 1) % SEQUENCE_RANGE
         return True
+
+    def _count_flags(self, flags: int) -> None:
+        for bit, name in FLAG_NAMES.items():
+            if flags & bit:
+                self.counters[name] += 1
+        if flags & f.FLAG_FIFO_OVERFLOW:
+            self.losses["overflows in the bridge"] += 1
 
     def radar(self, number: int) -> Channel708 | None:
         """The channel if it is a radar's. Where no bridge can announce one, a radar word does it."""

@@ -1,25 +1,27 @@
 """Records to events: the one way through decoding and monitoring, live and in replay alike.
 
-Reads no clock: whatever depends on time depends on the stamps of the records, ticks included.
+Reads no clock: whatever depends on time depends on the stamps of the records, ticks included. Words wait until a scan
+ends or a tick passes, or a second of them has gathered, and are then decoded together.
 """
 
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from decoders import arinc429, arinc708, control708
 from decoders import formats as f
-from decoders.health429 import Finding
-from decoders.racklink import MalformedBody, Packet, heartbeat, hello, radar_word, words429
+from decoders.arinc708 import Radials
+from decoders.racklink import ENTRY_429, MalformedBody, Packet, heartbeat, hello, radar_word
+from gateway.channels import Channel429
 from gateway.config import RackConfig, profile_of
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, StatusEvent, SummaryEvent
 from gateway.hearing import QUIET_NS, RADAR, Hearing
-from gateway.link import SPOILT, Channel429, Link
-from gateway.records import Note, Raw, Record, Status, Tick
+from gateway.link import SPOILT, Link
+from gateway.records import Raw, Record, Status, Tick
 from gateway.timebase import Timebase
+from gateway.waiting import WaitingRadials, WaitingWords, Words
 from monitor.aircraft import Aircraft, status_name
 from monitor.control_echo import ControlEcho
 from monitor.integrity import Comparison, Monitor, Verdict
@@ -33,7 +35,8 @@ Watcher = Callable[[Scan, Verdict, Comparison | None], None]
 class Pipeline:
     """Feed it records in order; it gives events. `watcher` sees each scan with its verdict, for reports.
 
-    A pipeline that follows one that failed takes over its counters and what it knew of the channels, and nothing else.
+    A pipeline that follows one that failed takes over its counters, the events it had not given yet and what it knew of
+    the channels, and nothing else.
     """
 
     def __init__(
@@ -60,80 +63,102 @@ class Pipeline:
         self._unused: dict[tuple[str, int], str] = {}  # why a channel is not used, told already
         self._doubted: set[str] = set()  # quantities whose words seem to be read in a wrong way, told already
         self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
-        self._last: Record | None = None
+        self._waiting: dict[tuple[str, int], tuple[Channel429, WaitingWords]] = {}  # by adapter and channel
+        self._radials = WaitingRadials()
+        self._stamp = 0, 0  # what an event carries of the record that causes it: UTC in ns, and sequence
+        self._fed = False
+        self._events: list[Event] = []  # not given yet
         if before:
-            self._counters = before._counters
+            self._counters, self._events = before._counters, before._events
             self._scans.number = before._scans.number
             self._echo.unlike = before._echo.unlike
             for name, link in self._links.items():
                 link.succeed(before._links[name])
+            for (adapter, _), (_, waiting) in before._waiting.items():
+                self._links[adapter].counters["words_429_unused"] += len(waiting)
+            if before._radials.link:
+                before._radials.link.counters["words_708_unused"] += len(before._radials)
 
-    def feed(self, record: Record) -> Iterator[Event]:
+    def feed(self, record: Record) -> list[Event]:
         """The events that one record causes."""
-        self._last = record
+        self._stamp, self._fed = (record.stamp.utc_ns, record.sequence), True
         if isinstance(record, Raw):
-            yield from self._raw(record)
+            self._raw(record)
+        elif isinstance(record, Tick):
+            self._tick(record)
         elif isinstance(record, Status):
-            self._counters[f"{record.adapter}.{record.state.lower()}"] += 1
-            if record.state == "UP":
-                self._hearing.expect(record.adapter, record.stamp.monotonic_ns)
-                if self._monitor:
-                    self._hearing.expect(RADAR, record.stamp.monotonic_ns)
-            if record.state in ("LOST", "BEHIND", "FAILED"):
-                self._troubles[record.adapter] = f"degraded: {record.adapter} {record.state}: {record.reason}"
-            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, record.state, record.reason)
-        elif isinstance(record, Note):
-            yield StatusEvent(record.stamp.utc_ns, record.sequence, "host", "NOTE", record.text)
+            self._status(record)
         else:
-            yield from self._tick(record)
+            self._tell("host", "NOTE", record.text)
+        return self._given()
 
-    def finish(self) -> Iterator[Event]:
+    def finish(self) -> list[Event]:
         """The sweep that is still open, and the summary of every counter."""
-        if self._last is None:
-            return
-        for scan in self._scans.finish():
-            yield from self._judge(scan, self._last)
+        if not self._fed:
+            return []
+        self._read_what_waits()
+        self._judge(self._scans.finish())
         counters = dict(self._counters)
         counters |= {"clock_restarts": self._timebase.restarts, "radials_unlike_command": self._echo.unlike}
         for name, link in self._links.items():
             counters |= {f"{name}.{key}": value for key, value in link.all_counters().items()}
-        yield SummaryEvent(self._last.stamp.utc_ns, self._last.sequence, dict(sorted(counters.items())))
+        self._events.append(SummaryEvent(*self._stamp, dict(sorted(counters.items()))))
+        return self._given()
 
-    def _raw(self, record: Raw) -> Iterator[Event]:
+    def _given(self) -> list[Event]:
+        events, self._events = self._events, []
+        return events
+
+    def _tell(self, adapter: str, state: str, reason: str) -> None:
+        self._events.append(StatusEvent(*self._stamp, adapter, state, reason))
+
+    def _status(self, record: Status) -> None:
+        self._counters[f"{record.adapter}.{record.state.lower()}"] += 1
+        if record.state == "UP":
+            self._hearing.expect(record.adapter, record.stamp.monotonic_ns)
+            if self._monitor:
+                self._hearing.expect(RADAR, record.stamp.monotonic_ns)
+        if record.state in ("LOST", "BEHIND", "FAILED"):
+            self._troubles[record.adapter] = f"degraded: {record.adapter} {record.state}: {record.reason}"
+        self._tell(record.adapter, record.state, record.reason)
+
+    def _raw(self, record: Raw) -> None:
         link = self._links.get(record.adapter)
         if link is None:
             self._counters["chunks_of_unknown_adapter"] += 1
             return
         link.counters["chunks"] += 1
-        link.dropped(record.dropped_before)
+        if record.dropped_before:
+            link.dropped(record.dropped_before)
         self._hearing.bytes_came(record.adapter, record.stamp.monotonic_ns)
         for packet in link.framer.feed(record.data):
-            yield from self._hear(record.adapter, record)
+            self._hear(record.adapter, record)
             if not link.count(packet):
                 continue
             try:
-                yield from self._packet(link, packet, record)
+                self._packet(link, packet, record)
             except MalformedBody:
                 link.counters["malformed_bodies"] += 1
 
-    def _hear(self, source: str, record: Raw) -> Iterator[Event]:
+    def _hear(self, source: str, record: Raw) -> None:
         if reason := self._hearing.heard(source, record.stamp.monotonic_ns):
-            yield StatusEvent(record.stamp.utc_ns, record.sequence, source, "HEARD", reason)
+            self._tell(source, "HEARD", reason)
 
-    def _packet(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
+    def _packet(self, link: Link, packet: Packet, record: Raw) -> None:
         if packet.time_ns > LATEST_DEVICE_NS:
             raise MalformedBody("device time is beyond any clock")
-        if packet.type == f.HELLO:
-            link.hello(hello(packet))
-            self._expect(link, record)
-        elif packet.type == f.WORDS_429:
-            yield from self._words(link, packet, record)
+        if packet.type == f.WORDS_429:
+            self._words(link, packet, record)
         elif packet.type == f.WORD_708:
-            yield from self._radar(link, packet, record)
+            self._radar(link, packet, record)
+        elif packet.type == f.HELLO:
+            said = hello(packet)
+            self._read_what_waits()  # as it was announced until now
+            link.hello(said)
+            self._expect(link, record)
         elif packet.type == f.HEARTBEAT:
             if lost := link.heartbeat(heartbeat(packet)):
-                reason = ", ".join(f"{count} {what}" for what, count in lost.items())
-                yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "LOSS", reason)
+                self._tell(record.adapter, "LOSS", ", ".join(f"{count} {what}" for what, count in lost.items()))
         elif packet.type != f.TIME_MARK:
             link.counters["packets_of_unknown_type"] += 1
 
@@ -143,7 +168,7 @@ class Pipeline:
             source = f"{record.adapter}/{number}" if isinstance(channel, Channel429) else RADAR
             self._hearing.expect(source, record.stamp.monotonic_ns)
 
-    def _claim(self, link: Link, packet: Packet, record: Raw) -> Generator[Event, None, bool]:
+    def _claim(self, link: Link, packet: Packet, record: Raw) -> bool:
         """Whether the words of a packet can be used; if not, why is said once.
 
         Two IRUs, or two radars, are never mixed: the first channel of each role is used until it falls silent.
@@ -152,7 +177,7 @@ class Pipeline:
         channel = link.channels.get(packet.channel)
         if name := link.identify(packet):
             reason = f"label 377 says what channel {packet.channel} is: read as {name} from now on"
-            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "IDENTIFIED", reason)
+            self._tell(record.adapter, "IDENTIFIED", reason)
             return False
         if channel is None:
             why = "until a hello or [adapters.channels] says what it carries"
@@ -167,66 +192,50 @@ class Pipeline:
         reason = f"channel {packet.channel} is recorded but not used {why}"
         if self._unused.get(here) != reason:
             self._unused[here] = reason
-            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "UNUSED_CHANNEL", reason)
+            self._tell(record.adapter, "UNUSED_CHANNEL", reason)
         return False
 
-    def _offset_ns(self, packet: Packet, record: Raw) -> Generator[Event, None, int]:
+    def _offset_ns(self, packet: Packet, record: Raw) -> int:
         """What to add to the packet's device times; a clock that began anew makes all older state worthless."""
         restarts = self._timebase.restarts
         offset_ns = self._timebase.offset_ns(record.adapter, packet.time_ns, record.stamp.monotonic_ns)
         if self._timebase.restarts > restarts:
-            for scan in self._scans.finish():
-                yield from self._judge(scan, record)
+            self._read_what_waits()
+            self._judge(self._scans.finish())
             self._aircraft = Aircraft(self._config.monitor.height_source)
             self._echo.forget()
             reason = f"the bridge's clock began anew at {packet.time_ns / 1e9:.3f} s; the state before it is dropped"
             self._troubles[f"clock of {record.adapter}"] = f"degraded: {record.adapter}: {reason}"
-            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, "CLOCK_RESTARTED", reason)
+            self._tell(record.adapter, "CLOCK_RESTARTED", reason)
         self._now_ns, self._now_host_ns = packet.time_ns + offset_ns, record.stamp.monotonic_ns
         return offset_ns
 
-    def _words(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
-        block = words429(packet)
-        link.counters["words_429"] += len(block.words)
-        link.books[packet.channel].arrived += len(block.words)
-        in_order = bool(np.all(np.diff(block.time_ns) >= 0))
-        if not (block.well_formed and in_order):
+    def _words(self, link: Link, packet: Packet, record: Raw) -> None:
+        count = len(packet.body) // ENTRY_429.itemsize
+        link.counters["words_429"] += count
+        link.books[packet.channel].arrived += count
+        if not count:
             link.counters["malformed_bodies"] += 1
-        usable = len(block.words) and in_order and (yield from self._claim(link, packet, record))
+            return
+        usable = self._claim(link, packet, record)
         channel = link.channels.get(packet.channel)
         if not usable or not isinstance(channel, Channel429):
-            link.counters["words_429_unused"] += len(block.words)
+            link.counters["words_429_unused"] += count
             return
-        values = arinc429.decode(block.words, channel.definitions, channel.orientation)
-        for status, count in enumerate(np.bincount(values.status).tolist()):
-            if status and count:
-                link.counters[f"words_429_{arinc429.Status(status).name.lower()}"] += count
-        offset_ns = yield from self._offset_ns(packet, record)
-        yield from self._hear(f"{record.adapter}/{packet.channel}", record)
-        for finding in channel.health.feed(block.time_ns, block.words, values):
-            yield self._finding(f"{record.adapter}/{packet.channel}", finding, record)
+        here = record.adapter, packet.channel
+        offset_ns = self._offset_ns(packet, record)
+        self._hear(f"{record.adapter}/{packet.channel}", record)
+        _, waiting = self._waiting.setdefault(here, (channel, WaitingWords()))
+        if channel.is_panel:  # the radials before it are compared with the command before it
+            self._read_what_waits()
+        elif not waiting.has_room_for(packet):
+            self._read_words(here)
+        waiting.put(packet, offset_ns)
         if channel.is_panel:
-            self._command(channel, block.time_ns + offset_ns, block.words, values)
-        true_ns = block.time_ns + offset_ns - channel.delays_ns[values.label]
-        used = channel.uses(block.words, values.label)
-        if used.any():
-            some = arinc429.Values429(values.label[used], values.value[used], values.status[used])
-            self._aircraft.feed(channel.definitions, true_ns[used], block.words[used], some, channel.join_rule)
+            self._waiting[here] = channel, waiting
+            self._read_words(here)
 
-    def _finding(self, about: str, finding: Finding, record: Raw) -> StatusEvent:
-        state = "BUS_WRONG" if finding.wrong else "BUS_RIGHT"
-        self._counters[f"{about}.{state.lower()}"] += 1
-        return StatusEvent(record.stamp.utc_ns, record.sequence, about, state, finding.reason)
-
-    def _command(
-        self, channel: Channel429, time_ns: NDArray[np.int64], words: NDArray[np.uint32], values: arinc429.Values429
-    ) -> None:
-        for k in np.flatnonzero(values.status == arinc429.Status.NORMAL):
-            definition = channel.definitions.labels[int(values.label[k])]
-            command = control708.decode(int(words[k]), definition, self._echo.command)
-            self._echo.feed_command(int(time_ns[k]), command)
-
-    def _radar(self, link: Link, packet: Packet, record: Raw) -> Iterator[Event]:
+    def _radar(self, link: Link, packet: Packet, record: Raw) -> None:
         word = radar_word(packet)
         link.counters["words_708"] += 1
         link.books[packet.channel].arrived += 1
@@ -234,68 +243,125 @@ class Pipeline:
         whole = not channel or word.bit_count == channel.profile.word_bits
         if channel and not whole:
             link.counters["words_708_" + ("short" if word.bit_count < channel.profile.word_bits else "long")] += 1
-        usable = whole and (yield from self._claim(link, packet, record))
+        usable = whole and self._claim(link, packet, record)
         if not usable or not channel:
             link.counters["words_708_unused"] += 1
             return
-        yield from self._hear(RADAR, record)
-        radials = arinc708.unpack(np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile)
-        for bit, name in enumerate(f.UNUSUAL_708):
-            if radials.unusual[0] >> bit & 1:
-                link.counters[f"words_708_{name}"] += 1
-        time_ns = packet.time_ns + (yield from self._offset_ns(packet, record))
-        if finding := self._echo.feed_radial(time_ns, radials):
-            link.counters[finding.state.lower()] += 1
-            yield StatusEvent(record.stamp.utc_ns, record.sequence, record.adapter, *finding)
-        for scan in self._scans.feed(np.array([time_ns]), radials):
-            yield from self._judge(scan, record)
+        self._hear(RADAR, record)
+        time_ns = packet.time_ns + self._offset_ns(packet, record)
+        if self._radials.link is not link or self._radials.channel is not channel:
+            self._read_what_waits()
+        if not self._radials.put(link, channel, time_ns, word.data):
+            self._read_what_waits()
 
-    def _judge(self, scan: Scan, record: Record) -> Iterator[Event]:
-        stamp = record.stamp.utc_ns, record.sequence
-        yield ScanEvent(
-            *stamp,
-            scan=scan.number,
-            radials=len(scan.time_ns),
-            sector=scan.sector_deg,
-            range_nm=scan.range_nm,
-            tilt_deg=scan.tilt_deg,
-            gaps=scan.missing,
-            repeated=scan.repeated,
-            cut_off=scan.cut_off,
-        )
-        if self._monitor is None:
+    def _read_what_waits(self) -> None:
+        """Decode all that waits: first what the aircraft and the panel say, then the radials, which may end a scan."""
+        for here in self._waiting:
+            self._read_words(here)
+        self._waiting.clear()  # a channel may be another one from now on
+        self._read_radials()
+
+    def _read_words(self, here: tuple[str, int]) -> None:
+        channel, waiting = self._waiting[here]
+        words = waiting.take()
+        if words is None:
             return
-        verdict, comparison = self._monitor.judge(scan, self._aircraft)
-        losses = [loss for link in self._links.values() for loss in link.take_losses()]
-        verdict = replace(verdict, reasons=(*verdict.reasons, *self._troubles.values(), *losses))
-        self._troubles.clear()
-        if self._watcher:
-            self._watcher(scan, verdict, comparison)
-        yield self._verdict(verdict, self._monitor, record)
+        link, joined = self._links[here[0]], words.joined
+        link.counters["malformed_bodies"] += joined.malformed
+        link.counters["words_429_unused"] += joined.left_out
+        if len(joined.words):
+            self._decode(link, f"{here[0]}/{here[1]}", channel, words)
 
-    def _verdict(self, verdict: Verdict, monitor: Monitor, record: Record) -> IntegrityEvent:
+    def _decode(self, link: Link, about: str, channel: Channel429, words: Words) -> None:
+        joined = words.joined
+        values = arinc429.decode(joined.words, channel.definitions, channel.orientation)
+        for status, count in enumerate(np.bincount(values.status).tolist()):
+            if status and count:
+                link.counters[f"words_429_{arinc429.Status(status).name.lower()}"] += count
+        for finding in channel.health.feed(joined.time_ns, joined.words, values):
+            state = "BUS_WRONG" if finding.wrong else "BUS_RIGHT"
+            self._counters[f"{about}.{state.lower()}"] += 1
+            self._tell(about, state, finding.reason)
+        sent_ns = joined.time_ns + words.offset_ns
+        if channel.is_panel:
+            for k in np.flatnonzero(values.status == arinc429.Status.NORMAL):
+                definition = channel.definitions.labels[int(values.label[k])]
+                command = control708.decode(int(joined.words[k]), definition, self._echo.command)
+                self._echo.feed_command(int(sent_ns[k]), command)
+        used = channel.uses(joined.words, values.label)
+        if used.any():
+            true_ns = sent_ns - channel.delays_ns[values.label]
+            some = arinc429.Values429(values.label[used], values.value[used], values.status[used])
+            self._aircraft.feed(channel.definitions, true_ns[used], joined.words[used], some, channel.join_rule)
+
+    def _read_radials(self) -> None:
+        waiting = self._radials.take()
+        link, channel = self._radials.link, self._radials.channel
+        if waiting is None or link is None or channel is None:
+            return
+        times_ns, words = waiting
+        radials = arinc708.unpack(words, channel.profile)
+        unusual = radials.unusual[radials.unusual > 0]
+        for bit, name in enumerate(f.UNUSUAL_708):
+            if count := int(np.count_nonzero(unusual >> bit & 1)):
+                link.counters[f"words_708_{name}"] += count
+        self._compare_with_command(link, times_ns.tolist(), radials)
+        self._judge(self._scans.feed(times_ns, radials))
+
+    def _compare_with_command(self, link: Link, times_ns: list[int], radials: Radials) -> None:
+        if not self._echo.listens:
+            return
+        for k, time_ns in enumerate(times_ns):
+            if finding := self._echo.feed_radial(time_ns, radials, k):
+                link.counters[finding.state.lower()] += 1
+                self._tell(link.config.name, *finding)
+
+    def _judge(self, scans: Iterable[Scan]) -> None:
+        for scan in scans:
+            self._events.append(
+                ScanEvent(
+                    *self._stamp,
+                    scan=scan.number,
+                    radials=len(scan.time_ns),
+                    sector=scan.sector_deg,
+                    range_nm=scan.range_nm,
+                    tilt_deg=scan.tilt_deg,
+                    gaps=scan.missing,
+                    repeated=scan.repeated,
+                    cut_off=scan.cut_off,
+                )
+            )
+            if self._monitor is None:
+                continue
+            verdict, comparison = self._monitor.judge(scan, self._aircraft)
+            losses = [loss for link in self._links.values() for loss in link.take_losses()]
+            verdict = replace(verdict, reasons=(*verdict.reasons, *self._troubles.values(), *losses))
+            self._troubles.clear()
+            if self._watcher:
+                self._watcher(scan, verdict, comparison)
+            self._say(verdict, self._monitor)
+
+    def _say(self, verdict: Verdict, monitor: Monitor) -> None:
         self._counters[f"verdicts_{verdict.verdict}"] += 1
         settings = monitor.settings
-        stamp = record.stamp.utc_ns, record.sequence
-        return IntegrityEvent(*stamp, method=settings.method, p_fa=settings.p_fa, **vars(verdict))
+        event = IntegrityEvent(*self._stamp, method=settings.method, p_fa=settings.p_fa, **vars(verdict))
+        self._events.append(event)
 
-    def _tick(self, record: Tick) -> Iterator[Event]:
-        stamp = record.stamp.utc_ns, record.sequence
+    def _tick(self, record: Tick) -> None:
         now_ns = record.stamp.monotonic_ns
+        self._read_what_waits()
         if self._hearing.silent_ns(RADAR, now_ns) > SILENCE_NS:
-            for scan in self._scans.finish():
-                yield from self._judge(scan, record)
+            self._judge(self._scans.finish())
         for source, reason in self._hearing.fell_silent(now_ns):
-            yield StatusEvent(*stamp, source, "QUIET", reason)
+            self._tell(source, "QUIET", reason)
             if source == RADAR and self._monitor:
-                silence = self._monitor.unavailable(self._scans.skip(), [f"radar: {reason}"])
-                yield self._verdict(silence, self._monitor, record)
+                self._say(self._monitor.unavailable(self._scans.skip(), [f"radar: {reason}"]), self._monitor)
         for quantity, doubt in self._aircraft.doubts().items():
             if quantity not in self._doubted:
                 self._doubted.add(quantity)
                 self._troubles[quantity] = f"degraded: {quantity}: {doubt}"
-                yield StatusEvent(*stamp, quantity, "STATE_DOUBT", doubt)
-        yield self._state(record)
+                self._tell(quantity, "STATE_DOUBT", doubt)
+        self._events.append(self._state(record))
 
     def _state(self, record: Tick) -> StateEvent:
         heard_ns = self._now_host_ns
@@ -314,4 +380,4 @@ class Pipeline:
         utc = self._aircraft.utc.at(now_ns)
         values["utc_s"] = None if utc.utc_ns is None else utc.utc_ns / 1e9
         validity["utc_s"] = utc.validity
-        return StateEvent(record.stamp.utc_ns, record.sequence, values, validity, age_s)
+        return StateEvent(*self._stamp, values, validity, age_s)

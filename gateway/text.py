@@ -7,9 +7,10 @@ import numpy as np
 from decoders import arinc429, arinc708
 from decoders import formats as f
 from decoders.racklink import MalformedBody, Packet, hello, radar_word, words429
+from gateway.channels import Channel429
 from gateway.config import RackConfig, profile_of
 from gateway.console import clock
-from gateway.link import FLAG_NAMES, SPOILT, Channel429, Link
+from gateway.link import FLAG_NAMES, SPOILT, Link
 from gateway.records import Raw, Record
 
 

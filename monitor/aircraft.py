@@ -153,6 +153,14 @@ def _has_sdi(definitions: Definitions) -> NDArray[np.bool_]:
     return np.isin(np.arange(256), [label for label, row in definitions.labels.items() if row.has_sdi])
 
 
+@cache
+def _one_by_one(equipment: int) -> NDArray[np.bool_]:
+    """By label (256,), whether its words are taken in their order: halves of positions, and parts of UTC."""
+    return np.array(
+        [(equipment, label) in AXIS_OF or (equipment in GNSS and label in UTC_LABELS) for label in range(256)]
+    )
+
+
 def _epoch_ns(definitions: Definitions, axis: Axis) -> int:
     """How far apart the words of one epoch may be: less than half the time to the next epoch."""
     definition = definitions.labels.get(axis.coarse)
@@ -194,17 +202,17 @@ class Aircraft:
         used = self._of_one_source(definitions, time_ns, words, values)
         time_ns, words = time_ns[used], words[used]
         values = Values429(values.label[used], values.value[used], values.status[used])
-        labels = values.label.tolist()
-        for label in dict.fromkeys(labels):
-            for source in SOURCES_OF.get((equipment, label), ()):
-                at = values.label == label
-                self._take(source, definitions, time_ns[at], words[at], values.value[at], values.status[at])
-        for k, label in enumerate(labels):
+        for k in np.flatnonzero(_one_by_one(equipment)[values.label]).tolist():
+            label = int(values.label[k])
             if axis := AXIS_OF.get((equipment, label)):
                 half = _Half(int(time_ns[k]), int(words[k]), int(values.status[k]), label == axis.coarse)
                 self._join(axis, equipment, half, join_rule, _epoch_ns(definitions, axis))
-            elif label in UTC_LABELS and equipment in GNSS:
+            else:
                 self.utc.feed(int(time_ns[k]), int(words[k]), values, k, definitions)
+        for label in np.flatnonzero(np.bincount(values.label, minlength=256)).tolist():
+            for source in SOURCES_OF.get((equipment, label), ()):
+                at = values.label == label
+                self._take(source, definitions, time_ns[at], words[at], values.value[at], values.status[at])
 
     def doubts(self) -> dict[str, str]:
         """By quantity, why its words seem to be read in a wrong way: the rule that joins them, or their units.

@@ -38,6 +38,11 @@ class ControlEcho:
         self._told = False  # whether a mismatch was told since the command changed
         self._open = False  # whether one was told that has not been told to be over
 
+    @property
+    def listens(self) -> bool:
+        """Whether a panel has been heard, so that there is something to compare."""
+        return self._heard_ns is not None
+
     def feed_command(self, time_ns: int, command: Command) -> None:
         """Take what the panel asks for now."""
         self._heard_ns = time_ns

@@ -5,6 +5,7 @@ tilt, range or mode change, or after a silence. What is missing or repeated insi
 step, and what is missing at its ends from the sweep before. An angle that trembles by one code neither turns nor moves.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decoders.arinc708 import Radials
-from decoders.formats import SCAN_ANGLE_LSB_DEG
+from decoders.formats import HEADER_708, SCAN_ANGLE_LSB_DEG
 from monitor.track import wrap
 
 JITTER_DEG = 1.5 * SCAN_ANGLE_LSB_DEG  # more than one code and less than two
@@ -21,6 +22,13 @@ JUMP_DEG = 30.0  # farther than any step between neighbours, nearer than any fly
 SILENCE_NS = 2_000_000_000
 LONGEST_SWEEP = 4096  # radials; a spinning antenna must still give scans
 STUCK_NS = 2_000_000_000  # longer than any antenna rests where it turns back; a stuck one must be told in time
+
+ANGLE_BIT, ANGLE_BITS = HEADER_708["scan_angle"]
+ANGLE_MASK, HALF_TURN = (1 << ANGLE_BITS) - 1, 1 << ANGLE_BITS - 1
+SETTINGS = ("stabilised", "mode", "tilt", "range")
+SETTINGS_MASK = sum((1 << HEADER_708[name][1]) - 1 << HEADER_708[name][0] for name in SETTINGS)
+MOVES_CODES = math.ceil(JITTER_DEG / SCAN_ANGLE_LSB_DEG)
+JUMP_CODES = math.floor(JUMP_DEG / SCAN_ANGLE_LSB_DEG)
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,27 @@ class Scan:
         return float(angles.min()), float(angles.max())
 
 
+class SweepWatch:
+    """Tells radials that certainly go on with their sweep from those that may end it, by their header bits alone.
+
+    Certain is the same tilt, range, mode and stabilisation, and a step in the direction of the step before, farther
+    than any tremble and nearer than any jump. Whoever must know at once when a sweep ends need not look at such ones.
+    """
+
+    def __init__(self) -> None:
+        self._settings = self._code = self._direction = self._time_ns = 0
+
+    def goes_on(self, time_ns: int, header: int) -> bool:
+        """Whether a radial goes on, by its first 64 bits, bit 0 the least significant; False where that is not sure."""
+        code, settings, waited_ns = header >> ANGLE_BIT & ANGLE_MASK, header & SETTINGS_MASK, time_ns - self._time_ns
+        step = (code - self._code + HALF_TURN & ANGLE_MASK) - HALF_TURN
+        certain = settings == self._settings and 0 < waited_ns <= SILENCE_NS
+        certain &= MOVES_CODES <= step * self._direction <= JUMP_CODES
+        self._settings, self._code, self._time_ns = settings, code, time_ns
+        self._direction = 0 if abs(step) < MOVES_CODES else 1 if step > 0 else -1
+        return certain
+
+
 class ScanBuilder:
     """Collects radials and gives a scan whenever a sweep has ended."""
 
@@ -66,25 +95,26 @@ class ScanBuilder:
 
     def feed(self, time_ns: NDArray[np.int64], radials: Radials) -> Iterator[Scan]:
         """Take radials (n,) in order of time; give the scans that they complete."""
-        angles = np.asarray(radials.scan_angle_deg, float)
         limits = (radials.annunciations >> 4 & 1).astype(bool)  # header bit 17, the fifth annunciation
-        for k in range(len(time_ns)):
-            time, angle = int(time_ns[k]), float(angles[k])
-            settings = (
-                float(radials.tilt_deg[k]),
-                float(radials.range_nm[k]),
-                int(radials.mode[k]),
-                bool(radials.stabilised[k]),
-                radials.bins.shape[1],
-            )
+        columns = (radials.tilt_deg, radials.range_nm, radials.mode, radials.stabilised, radials.faults)
+        rows = zip(
+            time_ns.tolist(),
+            radials.scan_angle_deg.tolist(),
+            limits.tolist(),
+            radials.bins,
+            *(column.tolist() for column in columns),
+            strict=True,
+        )
+        for time, angle, beyond, bins, tilt, range_nm, mode, stabilised, faults in rows:
+            settings = (tilt, range_nm, mode, stabilised, len(bins))
             if self._rows:
                 turned, broken = self._turns(angle), self._breaks(time, angle)
                 if turned or broken or settings != self._settings:
                     yield self._close(whole=turned and not broken)
             self._settings = settings
-            self._faults |= int(radials.faults[k])
+            self._faults |= faults
             self._follow(time, angle)
-            self._rows.append((time, angle, bool(limits[k]), radials.bins[k]))
+            self._rows.append((time, angle, beyond, bins))
 
     def finish(self) -> Iterator[Scan]:
         """Give the sweep that is still open, if any."""

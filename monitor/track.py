@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 NORMAL, STALE, MISSING = 0, 254, 255  # bus statuses of ARINC 429 words lie between
@@ -73,47 +74,14 @@ class Track:
 
         A step is what its last sample before the time said.
         """
+        found = Values(np.zeros(len(time_ns)), np.empty(len(time_ns), np.uint8))
+        samples = self._time[: self._end], self._value[: self._end], self._status[: self._end]
+        longest_ns = round(self.quantity.longest_gap_s / NS)
         if self.quantity.step:
-            return self._held(time_ns)
-        if self._end < 2:
-            return Values(np.zeros(len(time_ns)), np.full(len(time_ns), MISSING, np.uint8))
-        times, values, statuses = self._time[: self._end], self._value[: self._end], self._status[: self._end]
-        after = np.clip(np.searchsorted(times, time_ns), 1, self._end - 1)
-        before = after - 1
-        span = times[after] - times[before]
-        reach = np.maximum(span, np.maximum(time_ns - times[after], times[before] - time_ns))
-        status = np.maximum(statuses[before], statuses[after])
-        back, forth = self._lever(times[-1] - times[::-1], statuses[::-1]), self._lever(times - times[0], statuses)
-        before = np.where(time_ns > times[-1], self._end - 1 - back, before)
-        after = np.where(time_ns < times[0], forth, after)
-        span = times[after] - times[before]
-        status[(reach > round(self.quantity.longest_gap_s / NS)) & (status == NORMAL)] = STALE
-        step = values[after] - values[before]
-        if self.quantity.angle:
-            step = wrap(step)
-        # Without a slope the value holds; of two samples of one instant the later one stands.
-        fraction = np.where(span > 0, (time_ns - times[before]) / np.maximum(span, 1), 1.0)
-        value = values[before] + step * fraction
-        if self.quantity.angle:
-            value = wrap(value)
-        return Values(np.where(status == NORMAL, value, 0.0), status)
-
-    def _lever(self, distance_ns: NDArray[np.int64], status: NDArray[np.uint8]) -> int:
-        """How many samples from the end of the track, nearest first, its slope is taken over; 0 if there is none."""
-        longest = self.quantity.longest_gap_s / NS
-        far = int(np.searchsorted(distance_ns, SHORTEST_SLOPE * longest))
-        near_enough = far < len(distance_ns) and distance_ns[far] <= longest
-        return far if near_enough and not status[: far + 1].any() else 0
-
-    def _held(self, time_ns: NDArray[np.int64]) -> Values:
-        if not self._end:
-            return Values(np.zeros(len(time_ns)), np.full(len(time_ns), MISSING, np.uint8))
-        times = self._time[: self._end]
-        last = np.searchsorted(times, time_ns, side="right") - 1
-        status = self._status[last]
-        status[(time_ns - times[last] > round(self.quantity.longest_gap_s / NS)) & (status == NORMAL)] = STALE
-        status[last < 0] = MISSING
-        return Values(np.where(status == NORMAL, self._value[last], 0.0), status)
+            _held(*samples, longest_ns, time_ns, *found)
+        else:
+            _between(*samples, longest_ns, self.quantity.angle, time_ns, *found)
+        return found
 
     @property
     def newest(self) -> tuple[int, float, int] | None:
@@ -121,3 +89,64 @@ class Track:
         if not self._end:
             return None
         return int(self._time[self._end - 1]), float(self._value[self._end - 1]), int(self._status[self._end - 1])
+
+
+@njit(cache=True)
+def _held(times, values, statuses, longest_ns, time_ns, value, status):  # type: ignore[no-untyped-def] # typed by Track.at
+    for i in range(time_ns.size):
+        last = np.searchsorted(times, time_ns[i], side="right") - 1
+        status[i] = MISSING if last < 0 else statuses[last]
+        if status[i] == NORMAL and time_ns[i] - times[last] > longest_ns:
+            status[i] = STALE
+        if status[i] == NORMAL:
+            value[i] = values[last]
+
+
+@njit(cache=True)
+def _between(times, values, statuses, longest_ns, angle, time_ns, value, status):  # type: ignore[no-untyped-def] # typed by Track.at
+    if times.size < 2:
+        status[:] = MISSING
+        return
+    end = times.size - 1
+    back, forth = _lever_back(times, statuses, longest_ns), _lever_forth(times, statuses, longest_ns)
+    for i in range(time_ns.size):
+        now = time_ns[i]
+        after = min(max(np.searchsorted(times, now), 1), end)
+        before = after - 1
+        reach = max(times[after] - times[before], now - times[after], times[before] - now)
+        status[i] = max(statuses[before], statuses[after])
+        if status[i] == NORMAL and reach > longest_ns:
+            status[i] = STALE
+        if status[i] != NORMAL:
+            continue
+        if now > times[end]:
+            before = end - back
+        elif now < times[0]:
+            after = forth
+        span = times[after] - times[before]
+        step = values[after] - values[before]
+        if angle:
+            step = (step + 180) % 360 - 180
+        # Without a slope the value holds; of two samples of one instant the later one stands.
+        value[i] = values[before] + step * ((now - times[before]) / span if span > 0 else 1.0)
+        if angle:
+            value[i] = (value[i] + 180) % 360 - 180
+
+
+@njit(cache=True)
+def _lever_back(times, statuses, longest_ns):  # type: ignore[no-untyped-def] # typed by Track.at
+    """How many samples from the last one its slope is taken over; 0 if there is none."""
+    last = times.size - 1
+    first = np.searchsorted(times, times[last] - np.int64(SHORTEST_SLOPE * longest_ns), side="right") - 1
+    if first < 0 or times[last] - times[first] > longest_ns or statuses[first:].any():
+        return 0
+    return last - first
+
+
+@njit(cache=True)
+def _lever_forth(times, statuses, longest_ns):  # type: ignore[no-untyped-def] # typed by Track.at
+    """How many samples from the first one its slope is taken over; 0 if there is none."""
+    far = np.searchsorted(times, times[0] + np.int64(SHORTEST_SLOPE * longest_ns))
+    if far == times.size or times[far] - times[0] > longest_ns or statuses[: far + 1].any():
+        return 0
+    return far

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from gateway.channels import Channel429, Channel708
 from gateway.config import RackConfig, TomlFile, check_config, load_config, profile_of
 from gateway.errors import GatewayError
-from gateway.link import Channel429, Channel708, Link
+from gateway.link import Link
 from gateway.metadata import describe, recorded_config
 
 ADAPTER = '[[adapters]]\nname = "bridge"\nsource = "serial:/dev/x"\n'

@@ -6,8 +6,9 @@ from pydantic import ValidationError
 from decoders import formats as f
 from decoders.profiles import load_profile
 from decoders.racklink import ChannelCount, Framer, Hello, HelloChannel, Packet
+from gateway.channels import Channel429, Channel708
 from gateway.config import AdapterConfig
-from gateway.link import Channel429, Channel708, Link
+from gateway.link import Link
 from simulators import racklink
 from tests.decoders.bus import word429
 

@@ -289,7 +289,7 @@ def test_findings_about_a_bus_are_events_and_counted() -> None:
     bridge, pipeline = Bridge(), Pipeline(RACK, None)
     pitch = word429(0o324, {}, ssm=3)
     packets = [bridge.words(IRU, k / 250, [pitch]) for k in range(500)]
-    events = feed(pipeline, raw(1, 0, bridge.hello() + b"".join(packets)))
+    events = feed(pipeline, raw(1, 0, bridge.hello() + b"".join(packets)), tick(2, 2.0))
     (told,) = [event for event in only(StatusEvent, events) if event.state == "BUS_WRONG"]
     assert (told.adapter, told.reason) == ("bridge/2", "label 324 comes every 4.0 ms, 10 is the shortest interval")
     assert counters(pipeline)["bridge/2.bus_wrong"] == 1
