@@ -1,6 +1,15 @@
 """What every framer promises: recorded chunks of one adapter in, packets out, and no byte unaccounted for."""
 
-from typing import ClassVar, NamedTuple
+from collections.abc import Sequence
+from typing import Any, ClassVar, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from decoders import formats as f
+
+HEADER_FIELDS: Final = ("version", "type", "channel", "flags", "sequence", "time_ns")
+HEADER: Final = np.dtype(list(zip(HEADER_FIELDS, ("u1", "u1", "u1", "u1", "<u4", "<u8"), strict=True)))
 
 
 class Packet(NamedTuple):
@@ -12,6 +21,38 @@ class Packet(NamedTuple):
     sequence: int
     time_ns: int
     body: bytes
+
+
+class Packets(NamedTuple):
+    """Intact packets in order, a column each: `header` (n,) of `HEADER`, and which `chunk` each was completed by.
+
+    The body of packet k is `data[start[k] : start[k] + size[k]]`.
+    """
+
+    header: npt.NDArray[Any]
+    start: npt.NDArray[np.int64]
+    size: npt.NDArray[np.int64]
+    chunk: npt.NDArray[np.int64]
+    data: npt.NDArray[np.uint8]
+
+    def packet(self, k: int) -> Packet:
+        """One of them as an object."""
+        _, kind, channel, flags, sequence, time_ns = self.header[k].item()
+        return Packet(
+            kind, channel, flags, sequence, time_ns, self.data[self.start[k] : self.start[k] + self.size[k]].tobytes()
+        )
+
+
+def columns(packets: Sequence[Packet], chunks: Sequence[int]) -> Packets:
+    """Packets as columns."""
+    size = np.array([len(packet.body) for packet in packets], np.int64)
+    return Packets(
+        np.array([(f.LINK_VERSION, *packet[:-1]) for packet in packets], HEADER),
+        np.cumsum(size) - size,
+        size,
+        np.array(chunks, np.int64),
+        np.frombuffer(b"".join(packet.body for packet in packets), np.uint8),
+    )
 
 
 class PacketFramer:
@@ -31,6 +72,11 @@ class PacketFramer:
     def feed(self, data: bytes) -> list[Packet]:
         """Packets completed by the next chunk."""
         raise NotImplementedError
+
+    def frame(self, chunks: Sequence[bytes]) -> Packets:
+        """Packets completed by the next chunks, many at once."""
+        fed = [(packet, k) for k, chunk in enumerate(chunks) for packet in self.feed(chunk)]
+        return columns([packet for packet, _ in fed], [k for _, k in fed])
 
     def counters(self) -> dict[str, int]:
         """Every counter by name."""

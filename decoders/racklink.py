@@ -16,7 +16,8 @@ import numpy.typing as npt
 from cobs import cobs
 
 from decoders import formats as f
-from decoders.framing import Packet, PacketFramer
+from decoders.framing import HEADER, Packet, PacketFramer, Packets
+from decoders.kernels_link import CRC_RESIDUE, TABLES, intact
 
 __all__ = [
     "ChannelCount",
@@ -40,7 +41,6 @@ __all__ = [
 VERSION: Final = f.LINK_VERSION
 SHORTEST: Final = f.LINK_HEADER_BYTES + f.LINK_CRC_BYTES
 LONGEST: Final = f.LINK_MAX_BYTES
-CRC_RESIDUE: Final = zlib.crc32(bytes(f.LINK_CRC_BYTES))  # of all bytes that end with their CRC; that of none is 0
 PACKET_START: Final = re.compile(rb"(?=[\x03-\xff]\x01)")  # a COBS code that spans the version, 1, and a type
 MOST_STARTS: Final = 256  # of a run; noise has 16 in 4 kB, and a hostile sender shall not keep us busy
 ENTRY_429: Final = np.dtype([("offset_ns", "<u4"), ("word", "<u4")])
@@ -132,28 +132,50 @@ class Framer(PacketFramer):
 
     def feed(self, data: bytes) -> list[Packet]:
         """Packets completed by the next bytes of a stream (COBS, each closed by 0x00)."""
-        self.received += len(data)
-        *closed, rest = data.split(b"\0")
-        packets = []
-        if closed and self._run:
-            packets += self._close(closed.pop(0))
-        # Nearly all runs are intact and whole within the piece: they cost no copy, no call of ours and no counter each.
-        decode, crc32, new, framed = cobs.decode, zlib.crc32, tuple.__new__, 0
-        for run in closed:
-            try:
-                packet = decode(run)
-            except cobs.DecodeError:
-                packet = b""
-            size = len(packet)
-            if SHORTEST <= size <= LONGEST and crc32(packet) == CRC_RESIDUE and packet[0] == VERSION:
-                packets.append(new(Packet, _fields(size)(packet)))
-                framed += len(run) + 1
-            else:
-                packets += self._close(run)
-        self.framed += framed
-        self._extend(rest)
+        decoded, found, _ = self._unstuff([data])
+        if not len(found):
+            return []
+        whole, new = decoded[: found[-1, 0] + found[-1, 1]].tobytes(), tuple.__new__
+        return [new(Packet, _fields(size)(whole, begin)) for begin, size, _ in found.tolist()]
+
+    def frame(self, chunks: Sequence[bytes]) -> Packets:
+        """Packets completed by the next chunks of a stream."""
+        decoded, found, carried = self._unstuff(chunks)
+        begin, size, end = found.T
+        header = decoded[begin[:, np.newaxis] + np.arange(f.LINK_HEADER_BYTES)].view(HEADER)[:, 0]
+        chunk = np.searchsorted(np.cumsum([len(chunk) for chunk in chunks]), end - carried)
+        return Packets(header, begin + f.LINK_HEADER_BYTES, size - SHORTEST, chunk, decoded)
+
+    def _unstuff(self, chunks: Sequence[bytes]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64], int]:
+        """Packets without COBS, one behind the other; of each (n, 3) start, size, and the place behind it as fed.
+
+        And how many bytes of earlier chunks come before these. A compiled loop takes intact runs, which nearly all are.
+        """
+        carried = b"" if self._overlong else bytes(self._run)
+        stream = b"".join([carried, *chunks])
+        self.received += len(stream) - len(carried)
+        if carried:
+            self._run.clear()
+        data, decoded = np.frombuffer(stream, np.uint8), np.empty(len(stream) + LONGEST, np.uint8)
+        found, count, at = np.empty((len(stream) // (SHORTEST + 2) + 1, 3), np.int64), 0, 0
+        while True:
+            if not self._overlong:
+                count, stopped = intact(data, at, TABLES, decoded, found, count)
+                self.framed += stopped - at
+                at = stopped
+            end = stream.find(0, at)
+            if end < 0:
+                break
+            for packet in self._close(stream[at:end]):
+                whole = np.frombuffer(struct.pack(f.LINK_HEADER, VERSION, *packet[:-1]) + packet.body, np.uint8)
+                to = found[count - 1, :2].sum() if count else 0
+                decoded[to : to + len(whole)] = whole
+                found[count] = to, len(whole) + f.LINK_CRC_BYTES, end + 1
+                count += 1
+            at = end + 1
+        self._extend(stream[at:])
         self._check_books()
-        return packets
+        return decoded, found[:count], len(carried)
 
     def _extend(self, run: bytes) -> None:
         self._run += run
@@ -221,10 +243,10 @@ def parsed(packet: bytes) -> Packet | Fault:
 
 
 @cache  # at most one for each size that a packet can have
-def _fields(size: int) -> Callable[[bytes], tuple[Any, ...]]:
-    """Reads all fields of a Packet, the body too, in one call from an intact packet of `size` bytes."""
+def _fields(size: int) -> Callable[..., tuple[Any, ...]]:
+    """Reads all fields of a Packet, the body too, in one call from an intact packet of `size` bytes at a place."""
     without_version = f.LINK_HEADER.replace("B", "x", 1)
-    return struct.Struct(f"{without_version}{size - SHORTEST}s{f.LINK_CRC_BYTES}x").unpack
+    return struct.Struct(f"{without_version}{size - SHORTEST}s{f.LINK_CRC_BYTES}x").unpack_from
 
 
 def words429(packet: Packet) -> TimedWords:
