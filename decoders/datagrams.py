@@ -31,6 +31,8 @@ class DatagramFramer(Framer):
     Counts the whole chunk: what is recorded beside a good datagram counts as framed with it.
     """
 
+    frame = PacketFramer.frame  # chunk by chunk, not as one stream
+
     def feed(self, data: bytes) -> list[Packet]:
         """The packets of a chunk of datagrams."""
         self.received += len(data)

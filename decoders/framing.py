@@ -35,6 +35,10 @@ class Packets(NamedTuple):
     chunk: npt.NDArray[np.int64]
     data: npt.NDArray[np.uint8]
 
+    def of(self, which: "npt.NDArray[np.intp] | slice") -> "Packets":
+        """Some of them."""
+        return Packets(self.header[which], self.start[which], self.size[which], self.chunk[which], self.data)
+
     def packet(self, k: int) -> Packet:
         """One of them as an object."""
         _, kind, channel, flags, sequence, time_ns = self.header[k].item()

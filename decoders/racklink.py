@@ -263,25 +263,24 @@ def words429(packet: Packet) -> TimedWords:
     return TimedWords(time_ns, entries["word"], leftover, leftover == 0 and 1 <= count <= f.LINK_MAX_WORDS)
 
 
-def joined429(packets: Sequence[Packet]) -> Joined:
-    """The words of several ARINC 429 packets whose device times are within 292 years, as one block."""
-    bodies = [packet.body for packet in packets]
-    sizes = np.array([len(body) for body in bodies])
+def joined429(time_ns: npt.NDArray[np.int64], sizes: npt.NDArray[np.int64], bodies: bytes) -> Joined:
+    """The words of ARINC 429 packets (m,) of given device times, within 292 years, and bodies one behind the other."""
     counts = sizes // ENTRY_429.itemsize
-    if (counts * ENTRY_429.itemsize != sizes).any():
-        bodies = [body[: len(body) // ENTRY_429.itemsize * ENTRY_429.itemsize] for body in bodies]
-    entries = np.frombuffer(b"".join(bodies), ENTRY_429)
-    packet = np.repeat(np.arange(len(packets)), counts)
-    time_ns = np.array([packet.time_ns for packet in packets], np.int64)[packet] + entries["offset_ns"]
-    words = entries["word"].copy()
     wrong = (counts * ENTRY_429.itemsize != sizes) | (counts < 1) | (counts > f.LINK_MAX_WORDS)
-    back = (np.diff(time_ns) < 0) & (np.diff(packet) == 0)
+    if wrong.any():
+        ends = np.cumsum(sizes)
+        whole = zip((ends - sizes).tolist(), (ends - sizes + counts * ENTRY_429.itemsize).tolist(), strict=True)
+        bodies = b"".join(bodies[start:end] for start, end in whole)
+    entries = np.frombuffer(bodies, ENTRY_429)
+    packet = np.repeat(np.arange(len(sizes)), counts)
+    times_ns, words = time_ns[packet] + entries["offset_ns"], entries["word"].copy()
+    back = (np.diff(times_ns) < 0) & (np.diff(packet) == 0)
     if not back.any():
-        return Joined(time_ns, words, packet, int(wrong.sum()), 0)
-    backwards = np.isin(np.arange(len(packets)), packet[1:][back])
+        return Joined(times_ns, words, packet, int(wrong.sum()), 0)
+    backwards = np.isin(np.arange(len(sizes)), packet[1:][back])
     kept = ~backwards[packet]
     left_out = len(words) - int(kept.sum())
-    return Joined(time_ns[kept], words[kept], packet[kept], int((wrong | backwards).sum()), left_out)
+    return Joined(times_ns[kept], words[kept], packet[kept], int((wrong | backwards).sum()), left_out)
 
 
 def radar_word(packet: Packet) -> RadarWord:

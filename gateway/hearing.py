@@ -32,6 +32,10 @@ class Hearing:
         self._quiet.discard(source)
         return f"{self._things(source)} come again"
 
+    def is_quiet(self, source: str) -> bool:
+        """Whether a source's silence was told, so that its next word is to be told too."""
+        return source in self._quiet
+
     def silent_ns(self, source: str, now_ns: int) -> int:
         """How long a source has not been heard; 0 for one that is not expected."""
         return now_ns - self._heard_ns.get(source, now_ns)

@@ -1,6 +1,7 @@
 """One bridge as the gateway knows it: its channels, its packet counter, its losses."""
 
 from collections import Counter, defaultdict, deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,8 +44,8 @@ class Link:
     channels: dict[int, Channel429 | Channel708] = field(default_factory=dict)
     books: defaultdict[int, Books] = field(default_factory=lambda: defaultdict(Books))  # by channel
     _recent: deque[Packet] = field(default_factory=lambda: deque(maxlen=RECENT))
-    _next_sequence: int | None = None
-    _latest_ns: int = 0  # of the bridge's clock
+    next_sequence: int = -1  # of the packet that is to come; none has come yet
+    latest_ns: int = 0  # of the bridge's clock
     _clock_went_back: bool = False  # since the last heartbeat
     _said: dict[int, int] = field(default_factory=dict)  # by channel, its equipment as its last label 377 said
 
@@ -134,18 +135,18 @@ class Link:
         The very same packet once more, as a network may deliver it, is counted and must not be used again. One that
         others have overtaken is not lost after all.
         """
-        if packet.sequence != self._next_sequence and packet in self._recent:
+        if packet.sequence != self.next_sequence and packet in self._recent:
             self.counters["packets_repeated"] += 1
             return False
         self._recent.append(packet)
         self.counters["packets"] += 1
         if packet.type in (f.WORDS_429, f.WORD_708):
-            self._clock_went_back |= self._checked and packet.time_ns < self._latest_ns - GOES_BACK_NS
-            self._latest_ns = packet.time_ns
+            self._clock_went_back |= self._checked and packet.time_ns < self.latest_ns - GOES_BACK_NS
+            self.latest_ns = packet.time_ns
         if packet.flags:
             self._count_flags(packet.flags)
-        if self._next_sequence is not None:
-            gap = (packet.sequence - self._next_sequence) % SEQUENCE_RANGE
+        if self.next_sequence >= 0:
+            gap = (packet.sequence - self.next_sequence) % SEQUENCE_RANGE
             if gap < SEQUENCE_RANGE // 2:
                 self.counters["packets_lost"] += gap
                 self.losses["packets lost"] += gap
@@ -157,8 +158,15 @@ class Link:
                 self.counters["sequence_restarts"] += 1
                 for books in self.books.values():
                     books.restart()
-        self._next_sequence = (packet.sequence + 1) % SEQUENCE_RANGE
+        self.next_sequence = (packet.sequence + 1) % SEQUENCE_RANGE
         return True
+
+    def count_plain(self, newest: Sequence[Packet], count: int) -> None:
+        """Count packets of words that follow the one before and each other; the newest of them, `RECENT` at least."""
+        self.counters["packets"] += count
+        self._recent.extend(newest)
+        self.next_sequence = (newest[-1].sequence + 1) % SEQUENCE_RANGE
+        self.latest_ns = newest[-1].time_ns
 
     def _count_flags(self, flags: int) -> None:
         for bit, name in FLAG_NAMES.items():

@@ -3,19 +3,20 @@
 How long they wait depends on records and device times alone, so a replay reads them at the same records as live.
 """
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from decoders import formats as f
-from decoders.racklink import ENTRY_429, Joined, Packet, joined429
-from gateway.channels import Channel708
+from decoders.racklink import ENTRY_429, Joined, joined429
+from gateway.channels import Channel429, Channel708
 from gateway.link import Link
 from monitor.scans import SweepWatch
 
-LONGEST_WAIT_NS = 1_000_000_000
-MOST_RADIALS = 1024
+LONGEST_WAIT_NS: Final = 1_000_000_000
+MOST_RADIALS: Final = 1024
 
 
 class Words(NamedTuple):
@@ -25,36 +26,54 @@ class Words(NamedTuple):
     offset_ns: NDArray[np.int64]
 
 
+class Radar(NamedTuple):
+    """Radar words of a channel: common times (n,) ns, and their bytes (n, word)."""
+
+    link: Link
+    channel: Channel708
+    times_ns: NDArray[np.int64]
+    words: NDArray[np.uint8]
+
+
 class WaitingWords:
     """Packets of one ARINC 429 channel in order of time."""
 
-    def __init__(self) -> None:
-        self._packets: list[Packet] = []
+    def __init__(self, channel: Channel429) -> None:
+        self.channel = channel
+        self.end_ns = 0  # of the last word that waits
+        self._times_ns: list[int] = []
         self._offsets_ns: list[int] = []
-        self._end_ns = 0
+        self._sizes: list[int] = []
+        self._bodies: list[bytes] = []
 
     def __len__(self) -> int:
         """Words that wait."""
-        return sum(len(packet.body) // ENTRY_429.itemsize for packet in self._packets)
+        return sum(self._sizes) // ENTRY_429.itemsize
 
-    def has_room_for(self, packet: Packet) -> bool:
-        """Whether a packet can join: it does not overtake what waits, and nothing waits for too long."""
-        return not self._packets or self._end_ns <= packet.time_ns < self._packets[0].time_ns + LONGEST_WAIT_NS
+    @property
+    def until_ns(self) -> int | None:
+        """Device time from which on no packet can join, or None while nothing waits."""
+        return self._times_ns[0] + LONGEST_WAIT_NS if self._times_ns else None
 
-    def put(self, packet: Packet, offset_ns: int) -> None:
-        """Let a packet wait; `offset_ns` leads from its device time to the common one."""
-        self._packets.append(packet)
-        self._offsets_ns.append(offset_ns)
-        self._end_ns = packet.time_ns + int.from_bytes(packet.body[-8:-4], "little")
+    def put(
+        self, times_ns: Iterable[int], sizes: Iterable[int], bodies: bytes, offsets_ns: Iterable[int], end_ns: int
+    ) -> None:
+        """Let packets wait, their bodies one behind the other; offsets lead from device times to the common ones."""
+        self._times_ns += times_ns
+        self._sizes += sizes
+        self._bodies.append(bodies)
+        self._offsets_ns += offsets_ns
+        self.end_ns = end_ns
 
     def take(self) -> Words | None:
         """All that waits, if anything does."""
-        if not self._packets:
+        if not self._sizes:
             return None
-        joined = joined429(self._packets)
-        offset_ns = np.array(self._offsets_ns, np.int64)[joined.packet]
-        self._packets, self._offsets_ns = [], []
-        return Words(joined, offset_ns)
+        times_ns, sizes, offsets_ns = (np.array(x, np.int64) for x in (self._times_ns, self._sizes, self._offsets_ns))
+        joined = joined429(times_ns, sizes, b"".join(self._bodies))
+        for waiting in (self._times_ns, self._sizes, self._offsets_ns, self._bodies):
+            waiting.clear()
+        return Words(joined, offsets_ns[joined.packet])
 
 
 class WaitingRadials:
@@ -63,27 +82,31 @@ class WaitingRadials:
     def __init__(self) -> None:
         self.link: Link | None = None
         self.channel: Channel708 | None = None
+        self.watch = SweepWatch()
         self._times_ns: list[int] = []
         self._words: list[bytes] = []
-        self._watch = SweepWatch()
 
     def __len__(self) -> int:
         """Words that wait."""
-        return len(self._words)
+        return len(self._times_ns)
 
-    def put(self, link: Link, channel: Channel708, time_ns: int, word: bytes) -> bool:
+    def put(self, link: Link, channel: Channel708, device_ns: int, offset_ns: int, word: bytes) -> bool:
         """Let a word of the channel's length wait; whether it may. All that waits is of one channel."""
-        self.link, self.channel = link, channel
-        self._times_ns.append(time_ns)
-        self._words.append(word)
-        goes_on = self._watch.goes_on(time_ns, int.from_bytes(word[: f.HEADER_708_BYTES], "little"))
-        return goes_on and len(self._words) < MOST_RADIALS
+        goes_on = self.watch.goes_on(device_ns, int.from_bytes(word[: f.HEADER_708_BYTES], "little", signed=True))
+        self.put_all(link, channel, [device_ns + offset_ns], word)
+        return goes_on and len(self) < MOST_RADIALS
 
-    def take(self) -> tuple[NDArray[np.int64], NDArray[np.uint8]] | None:
-        """Times (n,) and bytes (n, word) of all that waits, if anything does."""
-        if not self._words:
+    def put_all(self, link: Link, channel: Channel708, times_ns: list[int], words: bytes) -> None:
+        """Let words wait that `watch` has seen and that may, one behind the other."""
+        self.link, self.channel = link, channel
+        self._times_ns += times_ns
+        self._words.append(words)
+
+    def take(self) -> Radar | None:
+        """All that waits, if anything does."""
+        if not self._times_ns or self.link is None or self.channel is None:
             return None
-        words = np.frombuffer(b"".join(self._words), np.uint8).reshape(len(self._words), -1)
+        words = np.frombuffer(b"".join(self._words), np.uint8).reshape(len(self), -1)
         times_ns = np.array(self._times_ns, np.int64)
         self._times_ns, self._words = [], []
-        return times_ns, words
+        return Radar(self.link, self.channel, times_ns, words)

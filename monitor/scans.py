@@ -8,13 +8,17 @@ step, and what is missing at its ends from the sweep before. An angle that tremb
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from decoders.arinc708 import Radials
 from decoders.formats import HEADER_708, SCAN_ANGLE_LSB_DEG
 from monitor.track import wrap
+
+Int = Any  # of whatever width the loop has
 
 JITTER_DEG = 1.5 * SCAN_ANGLE_LSB_DEG  # more than one code and less than two
 TREMBLE_DEG = 0.25 * SCAN_ANGLE_LSB_DEG  # so that three codes for two are a tremble, and four a missing radial
@@ -64,17 +68,35 @@ class SweepWatch:
     """
 
     def __init__(self) -> None:
-        self._settings = self._code = self._direction = self._time_ns = 0
+        self.last = np.zeros(4, np.int64)  # of the radial before: settings, angle code, direction, time
 
     def goes_on(self, time_ns: int, header: int) -> bool:
-        """Whether a radial goes on, by its first 64 bits, bit 0 the least significant; False where that is not sure."""
-        code, settings, waited_ns = header >> ANGLE_BIT & ANGLE_MASK, header & SETTINGS_MASK, time_ns - self._time_ns
-        step = (code - self._code + HALF_TURN & ANGLE_MASK) - HALF_TURN
-        certain = settings == self._settings and 0 < waited_ns <= SILENCE_NS
-        certain &= MOVES_CODES <= step * self._direction <= JUMP_CODES
-        self._settings, self._code, self._time_ns = settings, code, time_ns
-        self._direction = 0 if abs(step) < MOVES_CODES else 1 if step > 0 else -1
+        """Whether a radial goes on, by its first 64 bits as a signed integer, bit 0 the least significant."""
+        certain = bool(goes_on(self.last, time_ns, header))
+        follow(self.last, time_ns, header)
         return certain
+
+
+@njit(cache=True)
+def goes_on(last: NDArray[np.int64], time_ns: Int, header: Int) -> bool:
+    """Whether a radial certainly goes on with the sweep of the one before."""
+    settings, code, direction, before_ns = last
+    step = _step_codes(code, header)
+    same = header & SETTINGS_MASK == settings and 0 < time_ns - before_ns <= SILENCE_NS // 2  # whatever its clock
+    return bool(same and MOVES_CODES <= step * direction <= JUMP_CODES)
+
+
+@njit(cache=True)
+def follow(last: NDArray[np.int64], time_ns: Int, header: Int) -> None:
+    """Make a radial the one before."""
+    step = _step_codes(last[1], header)
+    last[0], last[1], last[3] = header & SETTINGS_MASK, header >> ANGLE_BIT & ANGLE_MASK, time_ns
+    last[2] = 0 if abs(step) < MOVES_CODES else 1 if step > 0 else -1
+
+
+@njit(cache=True)
+def _step_codes(code: Int, header: Int) -> Int:
+    return ((header >> ANGLE_BIT & ANGLE_MASK) - code + HALF_TURN & ANGLE_MASK) - HALF_TURN
 
 
 class ScanBuilder:

@@ -9,7 +9,7 @@ SECOND_NS = 1_000_000_000
 
 
 def test_words_of_a_single_bridge_keep_their_device_times() -> None:
-    timebase = Timebase()
+    timebase = Timebase(["a", "b"])
     delays = np.random.default_rng(1).exponential(5e6, 500)
     for k, delay in enumerate(delays):
         assert timebase.offset_ns("a", k * 10_000_000, 77 * SECOND_NS + k * 10_000_000 + int(delay)) == 0
@@ -17,7 +17,7 @@ def test_words_of_a_single_bridge_keep_their_device_times() -> None:
 
 
 def test_two_bridges_are_aligned_to_their_smallest_delays_whatever_the_jitter() -> None:
-    timebase = Timebase()
+    timebase = Timebase(["a", "b"])
     random = np.random.default_rng(2)
     ahead_ns = 3 * SECOND_NS  # the clock of b is that much ahead of a's
     offset = 0
@@ -31,7 +31,7 @@ def test_two_bridges_are_aligned_to_their_smallest_delays_whatever_the_jitter() 
 
 
 def test_drifting_clocks_are_followed() -> None:
-    timebase = Timebase()
+    timebase = Timebase(["a", "b"])
     offset = 0
     for k in range(60_000):
         true_ns = k * 10_000_000
@@ -41,7 +41,7 @@ def test_drifting_clocks_are_followed() -> None:
 
 
 def test_a_late_burst_does_not_move_the_clocks() -> None:
-    timebase = Timebase()
+    timebase = Timebase(["a", "b"])
     for k in range(100):
         timebase.offset_ns("a", k * 10_000_000, k * 10_000_000)
         timebase.offset_ns("b", k * 10_000_000, k * 10_000_000)
@@ -51,7 +51,7 @@ def test_a_late_burst_does_not_move_the_clocks() -> None:
 
 @pytest.mark.parametrize("restarted", ["a", "b"])
 def test_a_bridge_that_restarts_is_aligned_anew_and_counted(restarted: str) -> None:
-    timebase = Timebase()
+    timebase = Timebase(["a", "b"])
     offsets = {}
     for k in range(200):
         true_ns = 20 * SECOND_NS + k * 10_000_000
@@ -64,7 +64,7 @@ def test_a_bridge_that_restarts_is_aligned_anew_and_counted(restarted: str) -> N
 
 
 def test_a_clock_that_leaps_ahead_of_the_host_began_anew_and_one_that_was_only_silent_did_not() -> None:
-    timebase = Timebase()
+    timebase = Timebase(["a", "b"])
     timebase.offset_ns("a", 0, 0)
     timebase.offset_ns("a", 3600 * SECOND_NS, 3600 * SECOND_NS)
     assert timebase.restarts == 0

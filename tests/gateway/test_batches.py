@@ -1,0 +1,145 @@
+"""Many records at once say what they say one by one, however they are cut and whatever goes wrong on the way."""
+
+import struct
+from collections import Counter
+from collections.abc import Callable
+from functools import cache
+from itertools import cycle
+
+import numpy as np
+import pytest
+from cobs import cobs
+
+from decoders import formats as f
+from decoders.racklink import Framer, Packet
+from gateway.config import check_config
+from gateway.link import Link
+from gateway.metadata import build_monitor
+from gateway.pipeline import Pipeline
+from gateway.records import Raw, Record, Status, Tick
+from simulators import racklink
+from simulators.link import whole_stream
+from simulators.scenario import BUILT_IN_TERRAIN, Radar, white_mountains
+from tests.gateway.made import SECOND_NS, stamp
+
+SWEEP_S = 61 * 3 / 40
+CHUNK_NS = 10_000_000
+RADAR = 0  # its channel
+Change = Callable[[np.random.Generator, Packet], list[Packet]]
+
+
+def lost(random: np.random.Generator, packet: Packet) -> list[Packet]:
+    return [packet] if random.random() > 0.02 else []
+
+
+def doubled(random: np.random.Generator, packet: Packet) -> list[Packet]:
+    return [packet] * (1 + (random.random() < 0.02))
+
+
+def flagged(random: np.random.Generator, packet: Packet) -> list[Packet]:
+    flags = (f.FLAG_FIFO_OVERFLOW, f.FLAG_WORD_LENGTH, f.FLAG_PARITY)
+    return [packet._replace(flags=int(random.choice(flags)) if random.random() < 0.02 else 0)]
+
+
+def clock_jumps(_: np.random.Generator, packet: Packet) -> list[Packet]:
+    return [packet._replace(time_ns=packet.time_ns + (100 * SECOND_NS if packet.time_ns > 6 * SECOND_NS else 0))]
+
+
+def cut_body(random: np.random.Generator, packet: Packet) -> list[Packet]:
+    return [
+        packet._replace(body=packet.body[: random.integers(len(packet.body))]) if random.random() < 0.02 else packet
+    ]
+
+
+def as_it_is(_: np.random.Generator, packet: Packet) -> list[Packet]:
+    return [packet]
+
+
+CHANGES: list[Change] = [as_it_is, lost, doubled, flagged, clock_jumps, cut_body]
+
+
+@cache
+def flight() -> list[Packet]:
+    scenario = white_mountains(2 * SWEEP_S, seed=3).model_copy(
+        update={"radar": Radar(step_deg=3.0), "gnss_interval_s": 0.2}
+    )
+    return Framer().feed(whole_stream(scenario))
+
+
+def flown(change: Change, noise: float = 0.0) -> list[Record]:
+    """Two bridges over two sweeps, one with the radar on a serial line and one with the other buses on UDP."""
+    random, sequences = np.random.default_rng(5), {"line": 0, "net": 7}
+    read: dict[tuple[int, str], bytes] = {}
+    for packet in flight():
+        for name in ("line", "net"):
+            if packet.type in (f.WORDS_429, f.WORD_708) and (packet.channel == RADAR) != (name == "line"):
+                continue
+            sequences[name] += 1
+            for p in change(random, packet):
+                sent = (p.type, p.channel, sequences[name], p.time_ns + (name == "net") * SECOND_NS, p.body, p.flags)
+                garbage = random.integers(0, 256, 9, np.uint8).tobytes() if random.random() < noise else b""
+                data = racklink.encode(*sent)
+                if name == "net":
+                    data = in_datagrams(packet.time_ns, [garbage, cobs.decode(data[:-1])])
+                else:
+                    data = garbage + data
+                at = packet.time_ns // CHUNK_NS + (name == "net"), name
+                read[at] = read.get(at, b"") + data
+    read |= {(100 * k, "tick"): b"" for k in range(1, 10)}
+    records: list[Record] = [Status(0, stamp(0), "line", "UP"), Status(1, stamp(0), "net", "UP")]
+    for (chunk, name), data in sorted(read.items()):
+        when, sequence = stamp(chunk * CHUNK_NS / SECOND_NS), len(records)
+        dropped = 7 if sequence % 301 == 300 else 0
+        records.append(Tick(sequence, when) if name == "tick" else Raw(sequence, when, name, data, dropped))
+    return records
+
+
+def in_datagrams(arrival_ns: int, datagrams: list[bytes]) -> bytes:
+    return b"".join(struct.pack(f.DATAGRAM_RECORD, arrival_ns, len(data)) + data for data in datagrams if data)
+
+
+def pipeline() -> Pipeline:
+    adapters = [{"name": "line", "source": "serial:x"}, {"name": "net", "source": "udp:127.0.0.1:1"}]
+    config = check_config({"adapters": adapters, "terrain": [BUILT_IN_TERRAIN["white_mountains"]]}, "test")
+    return Pipeline(config, build_monitor(config))
+
+
+def given(records: list[Record], sizes: list[int]) -> list[str]:
+    """The events of records that are fed so many at a time, in turn; 1 is one by one."""
+    made, lines, at = pipeline(), list[str](), 0
+    for size in cycle(sizes):
+        if at >= len(records):
+            break
+        events = made.feed(records[at]) if size == 1 else made.feed_all(records[at : at + size])
+        lines += [event.to_json() for event in events]
+        at += size
+    return lines + [event.to_json() for event in made.finish()]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize("change", CHANGES)
+def test_many_records_at_once_say_what_they_say_one_by_one(change: Change, noise: float) -> None:
+    records = flown(change, noise)
+    expected = given(records, [1])
+    assert sum('"type":"integrity"' in line for line in expected) >= 2
+    for sizes in ([len(records)], [100], [3, 50, 1, 400]):
+        assert given(records, sizes) == expected
+
+
+def test_most_packets_of_a_flight_are_taken_many_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    packets = Counter[str]()
+    count_plain, count = Link.count_plain, Link.count
+
+    def many(link: Link, newest: list[Packet], size: int) -> None:
+        packets["many"] += size
+        count_plain(link, newest, size)
+
+    def one(link: Link, packet: Packet) -> bool:
+        packets["one"] += 1
+        return count(link, packet)
+
+    monkeypatch.setattr(Link, "count_plain", many)
+    monkeypatch.setattr(Link, "count", one)
+    records = flown(as_it_is)
+    given(records, [len(records)])
+    assert packets["many"] > 5 * packets["one"]
