@@ -33,3 +33,12 @@ class Timebase:
         if adapter == self._reference:
             return 0
         return round(offset - self._clocks[self._reference][0])
+
+    @property
+    def heard(self) -> bool:
+        """Whether there is a common time yet."""
+        return self._reference is not None
+
+    def host_offset_ns(self, adapter: str | None = None) -> int:
+        """What to add to device times of an adapter heard before, or to common times, for the host's monotonic clock."""
+        return round(self._clocks[adapter or str(self._reference)][0])

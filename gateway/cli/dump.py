@@ -6,7 +6,12 @@ from typing import Annotated
 import typer
 
 
-def dump(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) -> None:
+def dump(
+    recording: Annotated[Path, typer.Argument(help="recording (MCAP)")],
+    adapter: Annotated[list[str] | None, typer.Option(help="only of this adapter; repeatable")] = None,
+    channel: Annotated[list[int] | None, typer.Option(min=0, max=255, help="only of this channel; repeatable")] = None,
+    label: Annotated[list[str] | None, typer.Option(help="only ARINC 429 words of this label, octal; repeatable")] = None,
+) -> None:
     """Print one line a bus word, in the order they were recorded.
 
     Ctrl-C ends it early with exit code 130, SIGTERM with 143.
@@ -14,13 +19,23 @@ def dump(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
     from gateway.stopping import Stop
 
     stop = Stop()  # before the imports that take their time
+    import re
+
+    from gateway.errors import GatewayError
     from gateway.metadata import recorded_config
     from gateway.recording import Recording
-    from gateway.text import lines
+    from gateway.text import Wanted, lines
 
     source = Recording(recording)
     config = recorded_config(source.metadata)
-    for line in stop.until(lines(source, config)):
+    names = [one.name for one in config.adapters]
+    if unknown := {*(adapter or ())} - {*names}:
+        raise GatewayError(f"{recording} has no adapter {min(unknown)!r}: name one of {', '.join(names)}")
+    for octal in label or ():
+        if not re.fullmatch("[0-3]?[0-7]{1,2}", octal):
+            raise GatewayError(f"label {octal!r} is not octal: write 000 to 377")
+    wanted = Wanted(frozenset(adapter or ()), frozenset(channel or ()), frozenset(int(octal, 8) for octal in label or ()))
+    for line in lines(stop.until(source), config, wanted):
         typer.echo(line)
     if source.torn:
         typer.echo(f"shadebus: {recording}: {source.torn}", err=True)

@@ -1,0 +1,101 @@
+"""The judged scans of a recording, each with the aircraft behind it: what exports of scans and verdicts begin with."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.core import Core
+from gateway.events import Event, IntegrityEvent
+from gateway.exports import Job
+from gateway.metadata import recorded_monitor
+from gateway.pipeline import Pipeline
+from gateway.timebase import Timebase
+from gateway.words import UtcLayer
+from monitor.aircraft import Aircraft
+from monitor.integrity import Comparison, Monitor, Verdict
+from monitor.scans import Scan
+from monitor.settings import MonitorSettings
+
+
+class Judged(NamedTuple):
+    """A scan, the UTC of its radials i8 (n,), its verdict, both threads if they were compared, and the aircraft.
+
+    The aircraft is the pipeline's own, which goes on: ask it before the next scan.
+    """
+
+    scan: Scan
+    utc_ns: NDArray[np.int64]
+    verdict: Verdict
+    comparison: Comparison | None
+    aircraft: Aircraft
+
+
+class WithoutTerrain(Monitor):
+    """Says of every scan that nothing can be said."""
+
+    def __init__(self, settings: MonitorSettings) -> None:
+        self.settings = settings
+        self.calibration = None
+
+    def judge(self, scan: Scan, aircraft: Aircraft) -> tuple[Verdict, Comparison | None]:  # noqa: ARG002 # as Monitor's
+        """Unavailable."""
+        return self.unavailable(scan.number, ["no terrain to compare with"]), None
+
+
+class _Open(Pipeline):
+    """A pipeline that shows its aircraft and its clock."""
+
+    @property
+    def aircraft(self) -> Aircraft:
+        return self._aircraft
+
+    @property
+    def timebase(self) -> Timebase:
+        return self._timebase
+
+
+def monitor_of(job: Job) -> Monitor:
+    """The monitor that judges the scans. Raises GatewayError if its terrain is not there any more or has changed."""
+    monitor = None if job.without_terrain else recorded_monitor(job.recording.metadata, job.config, job.terrain)
+    return monitor or WithoutTerrain(job.config.monitor)
+
+
+def judged(job: Job, monitor: Monitor) -> Iterator[Judged | IntegrityEvent]:
+    """Each scan, and each verdict with the scan's behind it; a silent radar gives verdicts without scans.
+
+    The UTC of radials is laid on as that of words is. A scan that ends with a bridge's clock is timed by the old one.
+    """
+    found: list[Judged | IntegrityEvent] = []
+    pipelines: list[_Open] = []
+    utc, offset_ns = UtcLayer(), 0
+
+    def watch(scan: Scan, verdict: Verdict, comparison: Comparison | None) -> None:
+        found.append(Judged(scan, scan.time_ns, verdict, comparison, pipelines[-1].aircraft))
+
+    def build(before: Pipeline | None) -> Pipeline:
+        pipelines[:] = [_Open(job.config, monitor, watch, before)]
+        return pipelines[-1]
+
+    def emit(event: Event) -> None:
+        if isinstance(event, IntegrityEvent):
+            found.append(event)
+
+    core = Core(build, emit, job.failures.append)
+    for record in job.records():
+        restarts = pipelines[-1].timebase.restarts
+        core.process(record)
+        timebase = pipelines[-1].timebase
+        if timebase.heard and (timebase.restarts == restarts or not offset_ns):
+            offset_ns = utc.offset_ns("", timebase.host_offset_ns(), record.stamp)
+        yield from (_timed(item, offset_ns) for item in found)
+        found.clear()
+        if timebase.heard:
+            offset_ns = utc.offset_ns("", timebase.host_offset_ns(), record.stamp)
+    core.finish()
+    yield from (_timed(item, offset_ns) for item in found)
+
+
+def _timed(item: Judged | IntegrityEvent, offset_ns: int) -> Judged | IntegrityEvent:
+    return item._replace(utc_ns=item.utc_ns + offset_ns) if isinstance(item, Judged) else item
