@@ -40,5 +40,5 @@ class Timebase:
         return self._reference is not None
 
     def host_offset_ns(self, adapter: str | None = None) -> int:
-        """What to add to device times of an adapter heard before, or to common times, for the host's monotonic clock."""
+        """What to add to device times of an adapter, or to common times, for the host's monotonic clock."""
         return round(self._clocks[adapter or str(self._reference)][0])

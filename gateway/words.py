@@ -1,8 +1,8 @@
 """The words of a recording in blocks: whose they are, when they were on the bus, and how they are read.
 
-A record's UTC says when a chunk was read, which may be a while after its words. So the UTC of a word is its device time,
-laid onto the host's clocks by the smallest delay from word to reading (`gateway.timebase`): words of one bridge lie as
-far apart in UTC as by the bridge's own clock. What is laid on is held, and moves in one step once it is wrong by
+A record's UTC says when a chunk was read, which may be a while after its words. So the UTC of a word is its device
+time laid onto the host's clocks by the smallest delay from word to reading (`gateway.timebase`): words of one bridge
+lie as far apart in UTC as by the bridge's own clock. What is laid on is held, and moves in one step once it is wrong by
 `STEP_NS`, as after a drift of clocks or a step of the host's UTC.
 """
 
@@ -135,7 +135,8 @@ class WordStage:
         }
         found |= {f"packets of {name} that contradict their type": count for name, count in self._malformed.items()}
         found |= {
-            f"packets of {name} that came twice": link.counters["packets_repeated"] for name, link in self._links.items()
+            f"packets of {name} that came twice": link.counters["packets_repeated"]
+            for name, link in self._links.items()
         }
         return {what: count for what, count in found.items() if count}
 

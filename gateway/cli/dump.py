@@ -10,7 +10,9 @@ def dump(
     recording: Annotated[Path, typer.Argument(help="recording (MCAP)")],
     adapter: Annotated[list[str] | None, typer.Option(help="only of this adapter; repeatable")] = None,
     channel: Annotated[list[int] | None, typer.Option(min=0, max=255, help="only of this channel; repeatable")] = None,
-    label: Annotated[list[str] | None, typer.Option(help="only ARINC 429 words of this label, octal; repeatable")] = None,
+    label: Annotated[
+        list[str] | None, typer.Option(help="only ARINC 429 words of this label, octal; repeatable")
+    ] = None,
 ) -> None:
     """Print one line a bus word, in the order they were recorded.
 
@@ -34,7 +36,9 @@ def dump(
     for octal in label or ():
         if not re.fullmatch("[0-3]?[0-7]{1,2}", octal):
             raise GatewayError(f"label {octal!r} is not octal: write 000 to 377")
-    wanted = Wanted(frozenset(adapter or ()), frozenset(channel or ()), frozenset(int(octal, 8) for octal in label or ()))
+    wanted = Wanted(
+        frozenset(adapter or ()), frozenset(channel or ()), frozenset(int(octal, 8) for octal in label or ())
+    )
     for line in lines(stop.until(source), config, wanted):
         typer.echo(line)
     if source.torn:

@@ -1,4 +1,4 @@
-"""The log of `candump -L`, which can-utils replays: frames of CAN adapters as they came, other words as RackLink frames.
+"""The log of `candump -L`, which can-utils replays: frames of CAN adapters as they came, other words as RackLink's.
 
 Each adapter is an interface of its own, can0 and so on in the order of the configuration.
 """

@@ -1,7 +1,7 @@
 """CfRadial 1.4 netCDF, one file a scan, for a radar on a moving platform.
 
-Readers of fixed radars want one position a file: `latitude`, `longitude` and `altitude` are those of the ray in the middle
-of the sweep, and `platform_latitude` and so on those of each ray. `azimuth` and `elevation` are earth-referenced;
+Readers want one position a file, as fixed radars have: `latitude`, `longitude` and `altitude` are those of the ray in
+the middle of the sweep, `platform_latitude` and so on those of each ray. `azimuth` and `elevation` are earth-referenced;
 `rotation` and `tilt` are the aircraft's, about its vertical axis (axis_z). What is not known is a fill value.
 """
 
@@ -13,13 +13,12 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from decoders.profiles import Profile
-from gateway.config import profile_of
+from decoders.formats import SCAN_ANGLE_LSB_DEG
 from gateway.exports import Job
 from gateway.exports.pointing import Place, look, place, platform
 from gateway.exports.scans import Judged, judged, monitor_of
 from monitor.geodesy import NM_M
-from monitor.integrity import Comparison, Monitor
+from monitor.integrity import Monitor
 from monitor.scans import Scan
 
 STRING = 32  # characters
@@ -27,7 +26,7 @@ MISSING = -9999.0
 MISSING_LEVEL = -128  # of the fields, whose levels and states are one signed byte
 SECOND_NS = 1_000_000_000
 SHADOW_STATES = {-3: "before_first_lit_bin", 0: "shadow", 1: "lit"}
-TERRAIN_STATES = {**SHADOW_STATES, 2: "lit_peak"}
+MASKS = {"radar_shadow": SHADOW_STATES, "terrain_shadow": {**SHADOW_STATES, 2: "lit_peak"}}
 UNITS = {"velocity": "meters per second", "altitude": "meters"}  # by how a name ends; everything else is in degrees
 
 
@@ -38,7 +37,7 @@ def export(job: Job, path: Path) -> str:
     count = 0
     for item in judged(job, monitor):
         if isinstance(item, Judged):
-            write_scan(path / name_of(item), item, monitor, profile_of(job.config.radar_profile))
+            write_scan(path / name_of(item), item, monitor)
             count += 1
     return f"{count} scans, a file each"
 
@@ -50,8 +49,8 @@ def name_of(item: Judged) -> str:
     return f"cfrad.{span}_shadebus_{item.scan.number:05d}_SEC.nc"
 
 
-def write_scan(path: Path, item: Judged, monitor: Monitor, profile: Profile) -> None:
-    """Write one scan. `profile` names the levels of its bins."""
+def write_scan(path: Path, item: Judged, monitor: Monitor) -> None:
+    """Write one scan."""
     scan = item.scan
     n, bins = scan.bins.shape
     attitude = platform(scan, item.aircraft)
@@ -70,9 +69,9 @@ def write_scan(path: Path, item: Judged, monitor: Monitor, profile: Profile) -> 
         for name, values in {**named, **attitude, **own, "scan_angle": scan.scan_angle_deg}.items():
             _ray(file, name, values)
         file.createVariable("georefs_applied", "i1", ("time",))[:] = np.ones(n, np.int8)
-        _field(file, "radar_level", scan.bins.astype(np.int8), dict(enumerate(profile.level_names)))
-        for name, states, compared in _masks(scan, item.comparison):
-            _field(file, name, compared, states)
+        _field(file, "radar_level", scan.bins.astype(np.int8), dict(enumerate(item.profile.level_names)))
+        for (name, meanings), states in zip(MASKS.items(), _masks(item, monitor), strict=True):
+            _field(file, name, states, meanings)
 
 
 def _utc(time_ns: int) -> datetime:
@@ -182,16 +181,19 @@ def _field(file: netCDF4.Dataset, name: str, values: NDArray[np.int8], meanings:
     field[:] = values
 
 
-def _masks(scan: Scan, compared: Comparison | None) -> list[tuple[str, Mapping[int, str], NDArray[np.int8]]]:
-    """Both threads on the rays and bins that the verdict rests on, and fill values elsewhere."""
-    masks = [np.full(scan.bins.shape, MISSING_LEVEL, np.int8) for _ in range(2)]
+def _masks(item: Judged, monitor: Monitor) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """Both threads on every ray that the monitor can compare, not only on those that enter its verdict."""
+    scan = item.scan
+    radar, terrain = (np.full(scan.bins.shape, MISSING_LEVEL, np.int8) for _ in range(2))
+    every_ray = monitor.settings.model_copy(update={"radial_spacing_deg": SCAN_ANGLE_LSB_DEG / 2})
+    compared = Monitor(monitor.terrain, every_ray).judge(scan, item.aircraft)[1] if item.comparison else None
     if compared:
         steady = np.flatnonzero(~scan.beyond_limits)
         order = steady[np.argsort(scan.scan_angle_deg[steady], kind="stable")]
         rays = order[np.searchsorted(scan.scan_angle_deg[order], compared.scan_angle_deg)]  # of equal angles the first
-        for mask, states in zip(masks, (compared.radar_states, compared.dem_states), strict=True):
-            mask[rays, : states.shape[1]] = states
-    return [("radar_shadow", SHADOW_STATES, masks[0]), ("terrain_shadow", TERRAIN_STATES, masks[1])]
+        radar[rays, : compared.radar_states.shape[1]] = compared.radar_states
+        terrain[rays, : compared.dem_states.shape[1]] = compared.dem_states
+    return radar, terrain
 
 
 def _text(file: netCDF4.Dataset, name: str, text: str, dimensions: tuple[str, ...] = ()) -> None:

@@ -58,10 +58,7 @@ def batches(items: Iterable[Item]) -> Iterator[pa.RecordBatch]:
 def _batch(held: list[dict[str, Column]]) -> pa.RecordBatch:
     whole = {name: np.concatenate([columns[name] for columns in held]) for name in held[0]}
     valued = whole.pop("valued")
-    arrays = [
-        pa.array(whole[one.name], one.type, mask=~valued if one.name == "value" else None)  # type: ignore[call-overload]
-        for one in SCHEMA
-    ]
+    arrays = [pa.array(whole[one.name], one.type, mask=~valued if one.name == "value" else None) for one in SCHEMA]
     return pa.RecordBatch.from_arrays(arrays, schema=SCHEMA)
 
 

@@ -1,4 +1,4 @@
-"""Parquet: a directory with a table each of labels, radials, disparities and verdicts, in row groups of bounded size."""
+"""Parquet: a directory of tables, labels, radials, disparities and verdicts, in row groups of bounded size."""
 
 from pathlib import Path
 from typing import Any

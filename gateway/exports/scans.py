@@ -6,9 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from decoders.profiles import Profile
+from gateway.config import profile_of
 from gateway.core import Core
 from gateway.events import Event, IntegrityEvent
 from gateway.exports import Job
+from gateway.link import Channel708
 from gateway.metadata import recorded_monitor
 from gateway.pipeline import Pipeline
 from gateway.timebase import Timebase
@@ -30,6 +33,7 @@ class Judged(NamedTuple):
     verdict: Verdict
     comparison: Comparison | None
     aircraft: Aircraft
+    profile: Profile  # of the radar
 
 
 class WithoutTerrain(Monitor):
@@ -45,7 +49,7 @@ class WithoutTerrain(Monitor):
 
 
 class _Open(Pipeline):
-    """A pipeline that shows its aircraft and its clock."""
+    """A pipeline that shows its aircraft, its clock and its radar."""
 
     @property
     def aircraft(self) -> Aircraft:
@@ -54,6 +58,12 @@ class _Open(Pipeline):
     @property
     def timebase(self) -> Timebase:
         return self._timebase
+
+    @property
+    def profile(self) -> Profile:
+        (adapter, number), _ = self._users[Channel708.role]
+        channel = self._links[adapter].radar(number)
+        return channel.profile if channel else profile_of(self._config.radar_profile)
 
 
 def monitor_of(job: Job) -> Monitor:
@@ -72,7 +82,7 @@ def judged(job: Job, monitor: Monitor) -> Iterator[Judged | IntegrityEvent]:
     utc, offset_ns = UtcLayer(), 0
 
     def watch(scan: Scan, verdict: Verdict, comparison: Comparison | None) -> None:
-        found.append(Judged(scan, scan.time_ns, verdict, comparison, pipelines[-1].aircraft))
+        found.append(Judged(scan, scan.time_ns, verdict, comparison, pipelines[-1].aircraft, pipelines[-1].profile))
 
     def build(before: Pipeline | None) -> Pipeline:
         pipelines[:] = [_Open(job.config, monitor, watch, before)]
@@ -87,12 +97,11 @@ def judged(job: Job, monitor: Monitor) -> Iterator[Judged | IntegrityEvent]:
         restarts = pipelines[-1].timebase.restarts
         core.process(record)
         timebase = pipelines[-1].timebase
-        if timebase.heard and (timebase.restarts == restarts or not offset_ns):
-            offset_ns = utc.offset_ns("", timebase.host_offset_ns(), record.stamp)
-        yield from (_timed(item, offset_ns) for item in found)
+        began_anew = timebase.restarts != restarts
+        now_ns = utc.offset_ns("", timebase.host_offset_ns(), record.stamp) if timebase.heard else offset_ns
+        yield from (_timed(item, offset_ns if began_anew else now_ns) for item in found)
         found.clear()
-        if timebase.heard:
-            offset_ns = utc.offset_ns("", timebase.host_offset_ns(), record.stamp)
+        offset_ns = now_ns
     core.finish()
     yield from (_timed(item, offset_ns) for item in found)
 
