@@ -1,8 +1,9 @@
 """CfRadial 1.4 netCDF, one file a scan, for a radar on a moving platform.
 
 Readers want one position a file, as fixed radars have: `latitude`, `longitude` and `altitude` are those of the ray in
-the middle of the sweep, `platform_latitude` and so on those of each ray. `azimuth` and `elevation` are earth-referenced;
-`rotation` and `tilt` are the aircraft's, about its vertical axis (axis_z). What is not known is a fill value.
+the middle of the sweep, `platform_latitude` and so on those of each ray. `azimuth` and `elevation` are relative to
+north and the horizon, `rotation` and `tilt` to the aircraft, about its vertical axis (axis_z). What is not known is a
+fill value.
 """
 
 from collections.abc import Mapping
