@@ -8,8 +8,8 @@ import pytest
 
 from gateway.exports import export
 from gateway.stopping import Stop
-from tests.gateway.exports.recorded import Flown, fly
 from simulators.scenario import Scenario
+from tests.gateway.exports.recorded import Flown, fly
 
 Export = Callable[..., list[str]]
 

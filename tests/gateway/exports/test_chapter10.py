@@ -20,7 +20,7 @@ from gateway.records import Raw, Stamp
 from gateway.words import STEP_NS
 from simulators import racklink
 from tests.gateway.exports.recorded import Flown, To, record
-from tests.gateway.made import GNSS, HELLO, IRU, RADAR, RACK, SECOND_NS, UTC_NS, Bridge, radial, raw
+from tests.gateway.made import GNSS, HELLO, IRU, RACK, RADAR, SECOND_NS, UTC_NS, Bridge, radial, raw
 
 GOLDEN = "25eb07002c0000001400000000000038e8030000000054270200000000006005a19001e045236105a19001e0"
 WORD = 0xE00190A1
