@@ -1,7 +1,8 @@
 """Bus words as text, one line each: UTC of the word, adapter, channel, and the word with what it means."""
 
+import re
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from decoders import arinc429, arinc708
 from decoders import formats as f
 from gateway.config import RackConfig
 from gateway.console import clock
+from gateway.errors import GatewayError
 from gateway.link import FLAG_NAMES, SPOILT
 from gateway.records import Record
 from gateway.words import Block429, Item, Malformed, Word708, WordStage
@@ -21,6 +23,18 @@ class Wanted(NamedTuple):
     adapters: frozenset[str] = frozenset()
     channels: frozenset[int] = frozenset()
     labels: frozenset[int] = frozenset()
+
+    @classmethod
+    def of(cls, config: RackConfig, adapters: Iterable[str], channels: Iterable[int], labels: Iterable[str]) -> Self:
+        """What these names stand for; labels are octal. Raises GatewayError for one that does not exist."""
+        names = [one.name for one in config.adapters]
+        for name in adapters:
+            if name not in names:
+                raise GatewayError(f"no adapter {name!r} in the recording: name one of {', '.join(names)}")
+        for label in labels:
+            if not re.fullmatch("[0-3]?[0-7]{1,2}", label):
+                raise GatewayError(f"label {label!r} is not octal: write 000 to 377")
+        return cls(frozenset(adapters), frozenset(channels), frozenset(int(label, 8) for label in labels))
 
     def takes(self, item: Item) -> bool:
         """Whether anything of a block, a radar word or a malformed packet may be shown."""

@@ -21,24 +21,13 @@ def dump(
     from gateway.stopping import Stop
 
     stop = Stop()  # before the imports that take their time
-    import re
-
-    from gateway.errors import GatewayError
     from gateway.metadata import recorded_config
     from gateway.recording import Recording
     from gateway.text import Wanted, lines
 
     source = Recording(recording)
     config = recorded_config(source.metadata)
-    names = [one.name for one in config.adapters]
-    if unknown := {*(adapter or ())} - {*names}:
-        raise GatewayError(f"{recording} has no adapter {min(unknown)!r}: name one of {', '.join(names)}")
-    for octal in label or ():
-        if not re.fullmatch("[0-3]?[0-7]{1,2}", octal):
-            raise GatewayError(f"label {octal!r} is not octal: write 000 to 377")
-    wanted = Wanted(
-        frozenset(adapter or ()), frozenset(channel or ()), frozenset(int(octal, 8) for octal in label or ())
-    )
+    wanted = Wanted.of(config, adapter or (), channel or (), label or ())
     for line in lines(stop.until(source), config, wanted):
         typer.echo(line)
     if source.torn:
