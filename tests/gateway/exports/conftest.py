@@ -1,7 +1,6 @@
 """One short recorded flight for all exports, and a way to export in this process."""
 
 import signal
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,9 +8,7 @@ import pytest
 from gateway.exports import export
 from gateway.stopping import Stop
 from simulators.scenario import Scenario
-from tests.gateway.exports.recorded import Flown, fly
-
-Export = Callable[..., list[str]]
+from tests.gateway.exports.recorded import Flown, To, fly
 
 
 @pytest.fixture(scope="session")
@@ -31,11 +28,11 @@ def flown(tmp_path_factory: pytest.TempPathFactory, scenario: Scenario, flight: 
 
 
 @pytest.fixture
-def to(stop: Stop, tmp_path: Path) -> Callable[..., tuple[Path, list[str]]]:
+def to(stop: Stop, tmp_path: Path) -> To:
     """Export a recording to a format below the test's directory: the path, and what is said."""
 
-    def run(recording: Path, form: str, *, name: str = "out", **options: bool) -> tuple[Path, list[str]]:
+    def run(recording: Path, form: str, *, name: str = "out", without_terrain: bool = False) -> tuple[Path, list[str]]:
         path = tmp_path / name
-        return path, export(recording, form, path, stop, **options)
+        return path, export(recording, form, path, stop, without_terrain=without_terrain)
 
     return run

@@ -24,7 +24,6 @@ from tests.gateway.made import GNSS, HELLO, IRU, RACK, RADAR, SECOND_NS, UTC_NS,
 
 GOLDEN = "25eb07002c0000001400000000000038e8030000000054270200000000006005a19001e045236105a19001e0"
 WORD = 0xE00190A1
-EPOCH = np.datetime64(0, "ns")
 
 
 def packets(path: Path) -> list[Any]:
@@ -32,12 +31,12 @@ def packets(path: Path) -> list[Any]:
         return list(C10(file))
 
 
-def entries(path: Path, kind: type[object]) -> Iterator[tuple[int, int, Any]]:
+def entries(path: Path, kind: Any) -> Iterator[tuple[int, int, Any]]:
     """Channel id, UTC in ns and entry of each word, timed by the time packet before it."""
     time_ns = rtc = 0
     for packet in packets(path):
         if isinstance(packet, TimeF1):
-            time_ns, rtc = int((np.datetime64(packet.time, "ns") - EPOCH).astype(int)), packet.rtc
+            time_ns, rtc = int(np.datetime64(packet.time, "ns").astype(np.int64)), packet.rtc
         elif isinstance(packet, kind):
             at = packet.rtc
             for entry in list(packet):

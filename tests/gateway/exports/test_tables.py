@@ -4,6 +4,7 @@ import json
 import re
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import numpy as np
@@ -22,9 +23,14 @@ PAGE = Path(__file__).parents[3] / "docs" / "formats.md"
 TEXT = {"label": str, "adapter": str, "name": str, "units": str, "status": str}
 
 
-def table(path: Path, name: str) -> list[dict[str, object]]:
+def query(sql: str) -> Any:
+    """What duckdb answers."""
+    return duckdb.sql(sql)
+
+
+def table(path: Path, name: str) -> list[dict[str, Any]]:
     """All rows of a table in order, read by duckdb."""
-    found = duckdb.sql(f"select * from '{path / name}.parquet'")
+    found = query(f"select * from '{path / name}.parquet'")
     return [dict(zip(found.columns, row, strict=True)) for row in found.fetchall()]
 
 
@@ -34,7 +40,7 @@ def test_every_word_is_a_row_with_its_time_and_its_value(flown: Flown, to: To) -
     assert said[0].startswith(f"{path}: {len(flown.words)} labels, {len(flown.radar)} radials, ")
     found = [(row["channel"], row["device_ns"], row["word"]) for row in rows]
     assert found == [(one.channel, one.time_ns, one.word) for one in flown.words]
-    (ahead_ns,) = {row["utc_ns"] - row["device_ns"] for row in rows}  # type: ignore[operator]
+    (ahead_ns,) = {row["utc_ns"] - row["device_ns"] for row in rows}
     assert 0 <= ahead_ns - flown.least_delay_ns <= STEP_NS
     headings = [row["value"] for row in rows if (row["channel"], row["label"]) == (1, "314")]
     assert np.abs(np.array(headings) - (flown.scenario.flight.heading_deg - 360)).max() < 1  # turbulence is 0.3 deg
@@ -103,16 +109,16 @@ def test_verdicts_are_the_events_of_a_replay_and_disparities_make_their_statisti
         assert len(mine) == event["n_pairs"]
         d = [row["disparity_bins"] for row in mine]
         assert np.mean(np.square(d)) == pytest.approx(event["t_bins2"], rel=1e-12)
-        assert d == [row["radar_centre_bin"] - row["terrain_centre_bin"] for row in mine]  # type: ignore[operator]
+        assert d == [row["radar_centre_bin"] - row["terrain_centre_bin"] for row in mine]
 
 
 def test_the_queries_of_the_page_run(flown: Flown, to: To, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     to(flown.path, "parquet", name="flight")
     monkeypatch.chdir(tmp_path)
     queries = re.findall(r"```sql\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
-    assert len(queries) == 2
-    for query in queries:
-        assert duckdb.sql(query).fetchall()
+    assert len(queries) == 2, "the page has two"
+    for sql in queries:
+        assert query(sql).fetchall()
 
 
 def test_a_long_recording_becomes_row_groups_of_bounded_size(tmp_path: Path, to: To) -> None:
@@ -123,7 +129,7 @@ def test_a_long_recording_becomes_row_groups_of_bounded_size(tmp_path: Path, to:
     groups: Counter[str] = Counter()
     for name, most in (("labels", 65_536 + 255), ("radials", 4096)):
         meta = f"select distinct row_group_id, row_group_num_rows from parquet_metadata('{path / name}.parquet')"
-        sizes = [rows for _, rows in duckdb.sql(meta).fetchall()]
+        sizes = [rows for _, rows in query(meta).fetchall()]
         groups[name] = len(sizes)
         assert max(sizes) <= most
     assert groups == {"labels": 2, "radials": 2}
