@@ -38,7 +38,12 @@ def export(job: Job, path: Path) -> str:
     count = 0
     for item in judged(job, monitor):
         if isinstance(item, Judged):
-            write_scan(path / name_of(item), item, monitor)
+            try:
+                write_scan(path / name_of(item), item, monitor)
+            except RuntimeError as error:
+                if not str(error).startswith("NetCDF"):  # which is how that library tells of a full disk
+                    raise
+                raise OSError(f"{error}, perhaps as the disk is full") from error
             count += 1
     return f"{count} scans, a file each"
 

@@ -1,6 +1,7 @@
 """The verb: what it writes, what it says that it left out, and what it never does."""
 
 import struct
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from gateway.exports import FORMATS, export
 from gateway.stopping import Stop
 from tests.gateway.exports.recorded import TERRAIN, Flown, To, record
 from tests.gateway.made import IRU, RACK, Bridge, raw
-from tests.gateway.shell import shadebus
+from tests.gateway.shell import GATEWAY, START_S, limited, shadebus
 
 
 def test_the_verb_says_what_it_wrote(flown: Flown, tmp_path: Path) -> None:
@@ -26,6 +27,14 @@ def test_what_is_there_is_never_written_over(form: str, flown: Flown, tmp_path: 
     with pytest.raises(GatewayError, match="out exists already: choose another path with -o, or move it away"):
         to(flown.path, form)
     assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_a_disk_that_is_full_is_one_line_and_leaves_nothing_behind(flown: Flown, tmp_path: Path) -> None:
+    command = [*limited(20_000), *GATEWAY, "export", str(flown.path), "--to", "cfradial", "-o", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=START_S, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert f"cannot write {tmp_path / 'out'}: NetCDF: " in done.stderr
+    assert [*tmp_path.iterdir()] == []
 
 
 def test_dump_shows_the_words_of_one_label_of_a_channel(flown: Flown) -> None:
