@@ -6,6 +6,7 @@ Only frames with an extended identifier and data come out; all others are counte
 import re
 import struct
 from collections import Counter
+from collections.abc import Iterator
 from typing import Final, NamedTuple, Protocol
 
 from decoders import formats as f
@@ -27,6 +28,20 @@ class Frame(NamedTuple):
     identifier: int
     data: bytes
     size: int
+
+
+def split(chunk: bytes) -> Iterator[tuple[int, int, int, bytes]]:
+    """Arrival in ns of the host's monotonic clock, identifier and FD flags as SocketCAN's, and data of each frame.
+
+    A frame that is not whole ends it.
+    """
+    at, end, head = 0, len(chunk), RECORD.size
+    while at + head <= end:
+        arrival_ns, identifier, flags, length = RECORD.unpack_from(chunk, at)
+        at += head + length
+        if at > end:
+            return
+        yield arrival_ns, identifier, flags, chunk[at - length : at]
 
 
 class FrameReader(Protocol):
@@ -54,19 +69,16 @@ class Recorded:
 
     def feed(self, data: bytes) -> list[Frame]:
         """The frames of a chunk."""
-        frames, at, end, head = [], 0, len(data), RECORD.size
-        while at + head <= end:
-            _, identifier, _, length = RECORD.unpack_from(data, at)
-            size = head + length
-            if at + size > end:
-                break
+        frames, rest = [], len(data)
+        for _, identifier, _, payload in split(data):
+            size = RECORD.size + len(payload)
+            rest -= size
             if identifier & 0xE000_0000 == f.CAN_EXTENDED:
-                frames.append(Frame(identifier & 0x1FFF_FFFF, data[at + head : at + size], size))
+                frames.append(Frame(identifier & 0x1FFF_FFFF, payload, size))
             else:
                 self.skipped += size
                 self.counters["error_frames" if identifier & f.CAN_ERROR else "foreign_frames"] += 1
-            at += size
-        self.skipped += end - at
+        self.skipped += rest
         return frames
 
 

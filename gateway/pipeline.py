@@ -33,7 +33,9 @@ Watcher = Callable[[Scan, Verdict, Comparison | None], None]
 
 
 class Pipeline:
-    """Feed it records in order; it gives events. `watcher` sees each scan with its verdict, for reports.
+    """Feed it records in order; it gives events. `watcher` sees each scan with its verdict, for reports and exports.
+
+    Behind a scan that it sees stand the `aircraft` and the `listener` of that moment.
 
     A pipeline that follows one that failed takes over its counters, the events it had not given yet and what it knew of
     the channels, and nothing else.
@@ -50,8 +52,8 @@ class Pipeline:
         self._monitor = monitor
         self._watcher = watcher
         self._telling: Telling = before._telling if before else Telling()
-        self._listener = Listener(config, self._telling, self._read, self._clock_began_anew)
-        self._aircraft = Aircraft(config.monitor.height_source)
+        self.listener = Listener(config, self._telling, self._read, self._clock_began_anew)
+        self.aircraft = Aircraft(config.monitor.height_source)
         self._scans = ScanBuilder()
         self._echo = ControlEcho(config.monitor.control_delay_s)
         self._counters: Counter[str] = Counter()
@@ -61,7 +63,7 @@ class Pipeline:
             self._counters = before._counters
             self._scans.number = before._scans.number
             self._echo.unlike = before._echo.unlike
-            self._listener.succeed(before._listener)
+            self.listener.succeed(before.listener)
 
     def feed(self, record: Record) -> list[Event]:
         """The events that one record causes."""
@@ -72,7 +74,7 @@ class Pipeline:
         """The events that many records cause: the same as one by one, and sooner."""
         for together, group in groupby(records, self._goes_together):
             if together:
-                self._listener.take_all([record for record in group if isinstance(record, Raw)])
+                self.listener.take_all([record for record in group if isinstance(record, Raw)])
             else:
                 for record in group:
                     self._take(record)
@@ -80,12 +82,12 @@ class Pipeline:
 
     def _goes_together(self, record: Record) -> bool:
         # What was dropped before a record is owned up to by the next verdict and not by one before.
-        return isinstance(record, Raw) and not record.dropped_before and record.adapter in self._listener.links
+        return isinstance(record, Raw) and not record.dropped_before and record.adapter in self.listener.links
 
     def _take(self, record: Record) -> None:
         self._telling.begin(record)
         if isinstance(record, Raw):
-            self._listener.take(record)
+            self.listener.take(record)
         elif isinstance(record, Tick):
             self._tick(record)
         elif isinstance(record, Status):
@@ -99,7 +101,7 @@ class Pipeline:
             return []
         self._read()
         self._judge(self._scans.finish())
-        listener = self._listener
+        listener = self.listener
         counters = dict(self._counters)
         counters |= {"clock_restarts": listener.timebase.restarts, "radials_unlike_command": self._echo.unlike}
         if listener.chunks_of_unknown_adapter:
@@ -112,9 +114,9 @@ class Pipeline:
     def _status(self, record: Status) -> None:
         self._counters[f"{record.adapter}.{record.state.lower()}"] += 1
         if record.state == "UP":
-            self._listener.hearing.expect(record.adapter, record.stamp.monotonic_ns)
+            self.listener.hearing.expect(record.adapter, record.stamp.monotonic_ns)
             if self._monitor:
-                self._listener.hearing.expect(RADAR, record.stamp.monotonic_ns)
+                self.listener.hearing.expect(RADAR, record.stamp.monotonic_ns)
         if record.state in ("LOST", "BEHIND", "FAILED"):
             self._troubles[record.adapter] = f"degraded: {record.adapter} {record.state}: {record.reason}"
         self._telling.tell(record.adapter, record.state, record.reason)
@@ -122,7 +124,7 @@ class Pipeline:
     def _clock_began_anew(self, adapter: str, time_ns: int) -> None:
         """All older state is worthless."""
         self._judge(self._scans.finish())
-        self._aircraft = Aircraft(self._config.monitor.height_source)
+        self.aircraft = Aircraft(self._config.monitor.height_source)
         self._echo.forget()
         reason = f"the bridge's clock began anew at {time_ns / 1e9:.3f} s; the state before it is dropped"
         self._troubles[f"clock of {adapter}"] = f"degraded: {adapter}: {reason}"
@@ -130,7 +132,7 @@ class Pipeline:
 
     def _read(self) -> None:
         """Decode all that waits: first what the aircraft and the panel say, then the radials, which may end a scan."""
-        listener = self._listener
+        listener = self.listener
         for (adapter, number), waiting in sorted(listener.words.items(), key=itemgetter(0)):
             words, link = waiting.take(), listener.links[adapter]
             if words is None:
@@ -163,7 +165,7 @@ class Pipeline:
         if used.any():
             true_ns = sent_ns - channel.delays_ns[values.label]
             some = arinc429.Values429(values.label[used], values.value[used], values.status[used])
-            self._aircraft.feed(channel.definitions, true_ns[used], joined.words[used], some, channel.join_rule)
+            self.aircraft.feed(channel.definitions, true_ns[used], joined.words[used], some, channel.join_rule)
 
     def _read_radials(self, radials: Radar) -> None:
         unpacked = arinc708.unpack(radials.words, radials.channel.profile)
@@ -199,8 +201,8 @@ class Pipeline:
             )
             if self._monitor is None:
                 continue
-            verdict, comparison = self._monitor.judge(scan, self._aircraft)
-            losses = [loss for link in self._listener.links.values() for loss in link.take_losses()]
+            verdict, comparison = self._monitor.judge(scan, self.aircraft)
+            losses = [loss for link in self.listener.links.values() for loss in link.take_losses()]
             verdict = replace(verdict, reasons=(*verdict.reasons, *self._troubles.values(), *losses))
             self._troubles.clear()
             if self._watcher:
@@ -214,7 +216,7 @@ class Pipeline:
         self._telling.say(event)
 
     def _tick(self, record: Tick) -> None:
-        now_ns, hearing = record.stamp.monotonic_ns, self._listener.hearing
+        now_ns, hearing = record.stamp.monotonic_ns, self.listener.hearing
         self._read()
         if hearing.silent_ns(RADAR, now_ns) > SILENCE_NS:
             self._judge(self._scans.finish())
@@ -222,7 +224,7 @@ class Pipeline:
             self._telling.tell(source, "QUIET", reason)
             if source == RADAR and self._monitor:
                 self._say(self._monitor.unavailable(self._scans.skip(), [f"radar: {reason}"]), self._monitor)
-        for quantity, doubt in self._aircraft.doubts().items():
+        for quantity, doubt in self.aircraft.doubts().items():
             if quantity not in self._doubted:
                 self._doubted.add(quantity)
                 self._troubles[quantity] = f"degraded: {quantity}: {doubt}"
@@ -230,20 +232,20 @@ class Pipeline:
         self._telling.say(self._state(record))
 
     def _state(self, record: Tick) -> StateEvent:
-        heard_ns = self._listener.now_host_ns
+        heard_ns = self.listener.now_host_ns
         silent_ns = 0 if heard_ns is None else record.stamp.monotonic_ns - heard_ns
-        now_ns = self._listener.now_ns + silent_ns  # without words the state must still grow old
+        now_ns = self.listener.now_ns + silent_ns  # without words the state must still grow old
         values: dict[str, float | None] = {}
         validity: dict[str, str] = {}
         age_s: dict[str, float | None] = {}
-        for name, track in self._aircraft.tracks.items():
+        for name, track in self.aircraft.tracks.items():
             at = track.at(np.array([now_ns]))
             status = int(at.status[0])
             values[name] = float(at.value[0]) if status == 0 else None
             validity[name] = status_name(status)
             newest = track.newest
             age_s[name] = (now_ns - newest[0]) / 1e9 if newest else None
-        utc = self._aircraft.utc.at(now_ns)
+        utc = self.aircraft.utc.at(now_ns)
         values["utc_s"] = None if utc.utc_ns is None else utc.utc_ns / 1e9
         validity["utc_s"] = utc.validity
         return StateEvent(*self._telling.stamp, values, validity, age_s)

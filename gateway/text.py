@@ -1,66 +1,106 @@
-"""Bus words as text, one line each: UTC of reading, adapter, channel, and the word with what it means."""
+"""Bus words as text, one line each: UTC of the word, adapter, channel, and the word with what it means."""
 
+import re
 from collections.abc import Iterable, Iterator
+from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from decoders import arinc429, arinc708
 from decoders import formats as f
-from decoders.racklink import MalformedBody, Packet, hello, radar_word, words429
-from gateway.channels import Channel429
-from gateway.config import RackConfig, profile_of
+from gateway.config import RackConfig
 from gateway.console import clock
-from gateway.link import FLAG_NAMES, SPOILT, Link
-from gateway.records import Raw, Record
+from gateway.errors import GatewayError
+from gateway.link import FLAG_NAMES, SPOILT
+from gateway.records import Record
+from gateway.words import Block429, Item, Malformed, Word708, WordStage
 
 
-def lines(records: Iterable[Record], config: RackConfig) -> Iterator[str]:
-    """The lines of all words in records."""
-    links = {a.name: Link(a, profile_of(config.radar_profile)) for a in config.adapters}
+class Wanted(NamedTuple):
+    """Which words to show; an empty set stands for all. With labels no radar words are shown, which have none."""
+
+    adapters: frozenset[str] = frozenset()
+    channels: frozenset[int] = frozenset()
+    labels: frozenset[int] = frozenset()
+
+    @classmethod
+    def of(cls, config: RackConfig, adapters: Iterable[str], channels: Iterable[int], labels: Iterable[str]) -> Self:
+        """What these names stand for; labels are octal. Raises GatewayError for one that does not exist."""
+        names = [one.name for one in config.adapters]
+        for name in adapters:
+            if name not in names:
+                raise GatewayError(f"no adapter {name!r} in the recording: name one of {', '.join(names)}")
+        for label in labels:
+            if not re.fullmatch("[0-3]?[0-7]{1,2}", label):
+                raise GatewayError(f"label {label!r} is not octal: write 000 to 377")
+        return cls(frozenset(adapters), frozenset(channels), frozenset(int(label, 8) for label in labels))
+
+    def takes(self, item: Item) -> bool:
+        """Whether anything of a block, a radar word or a malformed packet may be shown."""
+        here = item.adapter in (self.adapters or (item.adapter,)) and item.channel in (self.channels or (item.channel,))
+        return here and (not self.labels or isinstance(item, Block429))
+
+    def among(self, labels: NDArray[np.uint8]) -> NDArray[np.intp]:
+        """Which words are to be shown of those with these labels (n,)."""
+        return np.flatnonzero(np.isin(labels, [*self.labels])) if self.labels else np.arange(len(labels))
+
+
+EVERYTHING = Wanted()
+
+
+def lines(records: Iterable[Record], config: RackConfig, wanted: Wanted = EVERYTHING) -> Iterator[str]:
+    """The lines of the wanted words in records."""
+    stage = WordStage(config)
     for record in records:
-        if not isinstance(record, Raw) or record.adapter not in links:
-            continue
-        link = links[record.adapter]
-        for packet in link.framer.feed(record.data):
-            flags = "".join(f"  {name}" for bit, name in FLAG_NAMES.items() if packet.flags & bit)
-            place = f"({clock(record.stamp.utc_ns)}) {record.adapter} {packet.channel:3d}"
-            try:
-                if packet.type == f.HELLO:
-                    link.hello(hello(packet))
-                elif packet.type == f.WORDS_429:
-                    yield from (f"{place}  429  {text}{flags}" for text in _words(link, packet))
-                elif packet.type == f.WORD_708:
-                    yield f"{place}  708  {_radar(link, packet)}{flags}"
-            except MalformedBody as error:
-                yield f"{place}  malformed: {error}"
+        for item in stage.feed(record):
+            if not wanted.takes(item):
+                continue
+            if isinstance(item, Malformed):
+                yield f"{_place(item, item.utc_ns)}  malformed: {item.reason}"
+            elif isinstance(item, Word708):
+                yield f"{_place(item, item.utc_ns)}  708  {_radar(item)}{_flags(item.flags)}"
+            else:
+                yield from _words(item, wanted)
 
 
-def _words(link: Link, packet: Packet) -> Iterator[str]:
-    block = words429(packet)
-    link.identify(packet)
-    channel = link.channels.get(packet.channel)
-    if not isinstance(channel, Channel429) or packet.flags & SPOILT:
-        why = "not decoded" if packet.flags & SPOILT else "channel without definitions"
-        yield from (f"{word:08x}  {why}" for word in block.words.tolist())
-        return
-    values = arinc429.decode(block.words, channel.definitions, channel.orientation)
-    for k, word in enumerate(block.words.tolist()):
-        label, status = int(values.label[k]), int(values.status[k])
-        definition = channel.definitions.labels.get(label)
+def _place(item: Item, utc_ns: int) -> str:
+    return f"({clock(utc_ns)}) {item.adapter} {item.channel:3d}"
+
+
+def _flags(flags: int) -> str:
+    return "".join(f"  {name}" for bit, name in FLAG_NAMES.items() if flags & bit)
+
+
+def _words(block: Block429, wanted: Wanted) -> Iterator[str]:
+    shown = wanted.among(arinc429.unpack(block.words, block.orientation).label)
+    meanings = _meanings(block)
+    for k in shown.tolist():
+        word = f"{block.words[k]:08x}  {meanings[k] if meanings else block.why_not_decoded}"
+        yield f"{_place(block, int(block.utc_ns[k]))}  429  {word}{_flags(block.flags)}"
+
+
+def _meanings(block: Block429) -> list[str]:
+    """What each word of a block says; nothing if it is not decoded."""
+    values = block.decoded()
+    if values is None or block.reading is None:
+        return []
+    found = []
+    for label, value, status in zip(*(column.tolist() for column in values), strict=True):
+        definition = block.reading.definitions.labels.get(label)
         meaning = arinc429.Status(status).name
         if status == arinc429.Status.NORMAL and definition:
-            meaning = f"{values.value[k]:.9g} {definition.units}".rstrip()
-        yield f"{word:08x}  {label:03o} {definition.name if definition else 'unknown label'}: {meaning}"
+            meaning = f"{value:.9g} {definition.units}".rstrip()
+        found.append(f"{label:03o} {definition.name if definition else 'unknown label'}: {meaning}")
+    return found
 
 
-def _radar(link: Link, packet: Packet) -> str:
-    word = radar_word(packet)
-    channel = link.radar(packet.channel)
+def _radar(word: Word708) -> str:
     text = f"{word.data[: f.HEADER_708_BYTES].hex()}...  "
-    readable = word.bit_count >= 8 * f.HEADER_708_BYTES and not packet.flags & SPOILT & ~f.FLAG_WORD_LENGTH
-    if not channel or not readable:
+    readable = word.bit_count >= 8 * f.HEADER_708_BYTES and not word.flags & SPOILT & ~f.FLAG_WORD_LENGTH
+    if not word.reading or not readable:
         return f"{text}{word.bit_count} bits, not decoded"
-    array, profile = np.frombuffer(word.data, np.uint8)[np.newaxis], channel.profile
+    array, profile = np.frombuffer(word.data, np.uint8)[np.newaxis], word.reading.profile
     if word.bit_count == profile.word_bits:
         radial = arinc708.unpack(array, profile)
         return f"{text}{_header(radial)}  {np.count_nonzero(radial.bins)} of {profile.bins} bins lit{_unusual(radial)}"

@@ -36,6 +36,16 @@ class Timebase:
         self.restarts += anew
         return int(offset_ns)
 
+    @property
+    def heard(self) -> bool:
+        """Whether there is a common time yet."""
+        return bool(self.reference[0] >= 0)
+
+    def host_offset_ns(self, adapter: str | None = None) -> int:
+        """What to add to device times of an adapter, or to common times, for the host's monotonic clock."""
+        number = self._numbers[adapter] if adapter else int(self.reference[0])
+        return round(float(self.clocks[number]["offset_ns"]))
+
 
 @njit(cache=True)
 def begins_anew(clocks: NDArray[Any], number: Int, device_ns: Int, host_ns: Int) -> bool:

@@ -12,6 +12,7 @@ from gateway.cli.demo import demo
 from gateway.cli.devices import devices
 from gateway.cli.doctor import doctor
 from gateway.cli.dump import dump
+from gateway.cli.export import export
 from gateway.cli.info import info
 from gateway.cli.labels import labels
 from gateway.cli.replay import replay
@@ -26,7 +27,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for verb in (demo, run, simulate, replay, dump, info, labels, thresholds, devices, doctor):
+for verb in (demo, run, simulate, replay, dump, export, info, labels, thresholds, devices, doctor):
     app.command()(verb)
 
 decode = typer.Typer(help="Explain one bus word, field by field.", no_args_is_help=True)

@@ -6,7 +6,14 @@ from typing import Annotated
 import typer
 
 
-def dump(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) -> None:
+def dump(
+    recording: Annotated[Path, typer.Argument(help="recording (MCAP)")],
+    adapter: Annotated[list[str] | None, typer.Option(help="only of this adapter; repeatable")] = None,
+    channel: Annotated[list[int] | None, typer.Option(min=0, max=255, help="only of this channel; repeatable")] = None,
+    label: Annotated[
+        list[str] | None, typer.Option(help="only ARINC 429 words of this label, octal; repeatable")
+    ] = None,
+) -> None:
     """Print one line a bus word, in the order they were recorded.
 
     Ctrl-C ends it early with exit code 130, SIGTERM with 143.
@@ -16,11 +23,12 @@ def dump(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
     stop = Stop()  # before the imports that take their time
     from gateway.metadata import recorded_config
     from gateway.recording import Recording
-    from gateway.text import lines
+    from gateway.text import Wanted, lines
 
     source = Recording(recording)
     config = recorded_config(source.metadata)
-    for line in stop.until(lines(source, config)):
+    wanted = Wanted.of(config, adapter or (), channel or (), label or ())
+    for line in lines(stop.until(source), config, wanted):
         typer.echo(line)
     if source.torn:
         typer.echo(f"shadebus: {recording}: {source.torn}", err=True)

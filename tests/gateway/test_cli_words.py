@@ -20,6 +20,7 @@ VERBS = (
     "simulate",
     "replay",
     "dump",
+    "export",
     "info",
     "labels",
     "thresholds",

@@ -1,0 +1,184 @@
+"""Parquet: a directory of tables, labels, radials, disparities and verdicts, in row groups of bounded size."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from decoders import arinc708
+from decoders import formats as f
+from gateway.events import IntegrityEvent
+from gateway.exports import Job
+from gateway.exports.labels import SCHEMA, batches
+from gateway.exports.scans import Judged, judged, monitor_of
+from gateway.link import SPOILT
+from gateway.words import Word708
+from monitor.integrity import Monitor
+from monitor.shade import pair, shadows
+
+ROWS = 4096  # of a row group whose rows are gathered one by one
+RADIALS = pa.schema(
+    [
+        ("utc_ns", pa.int64()),
+        ("device_ns", pa.int64()),
+        ("adapter", pa.string()),
+        ("channel", pa.uint8()),
+        ("flags", pa.uint8()),
+        ("bit_count", pa.uint16()),
+        ("label", pa.string()),
+        ("control_accept", pa.uint8()),
+        ("slave", pa.bool_()),
+        ("annunciations", pa.uint8()),
+        ("faults", pa.uint8()),
+        ("stabilised", pa.bool_()),
+        ("mode", pa.uint8()),
+        ("mode_name", pa.string()),
+        ("tilt_deg", pa.float64()),
+        ("gain_db", pa.float64()),
+        ("gain_calibrated", pa.bool_()),
+        ("range_nm", pa.float64()),
+        ("data_accept", pa.uint8()),
+        ("scan_angle_deg", pa.float64()),
+        ("unusual", pa.uint8()),
+        ("bins", pa.binary()),
+    ]
+)
+DISPARITIES = pa.schema(
+    [
+        ("utc_ns", pa.int64()),
+        ("scan", pa.int64()),
+        ("scan_angle_deg", pa.float64()),
+        ("radar_centre_bin", pa.float64()),
+        ("terrain_centre_bin", pa.float64()),
+        ("disparity_bins", pa.float64()),
+    ]
+)
+VERDICTS = pa.schema(
+    [
+        ("utc_ns", pa.int64()),
+        ("sequence", pa.uint64()),
+        ("scan", pa.int64()),
+        ("verdict", pa.string()),
+        ("reasons", pa.list_(pa.string())),
+        ("method", pa.string()),
+        ("p_fa", pa.float64()),
+        ("n_pairs", pa.int64()),
+        *(
+            (name, pa.float64())
+            for name in (
+                "t_bins2",
+                "t_normalised",
+                "q",
+                "threshold",
+                "mean_bins",
+                "mean_stderr_bins",
+                "unmatched_radar",
+                "unmatched_dem",
+                "mdb_bins",
+            )
+        ),
+        ("calibration", pa.string()),
+    ]
+)
+
+
+class Table:
+    """A table that is written as its rows come, a row group at a time."""
+
+    def __init__(self, path: Path, schema: pa.Schema) -> None:
+        self.rows = 0
+        self._schema = schema
+        self._writer = pq.ParquetWriter(path, schema, compression="zstd")
+        self._held: list[dict[str, Any]] = []
+
+    def __enter__(self) -> "Table":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._flush()
+        self._writer.close()
+
+    def add(self, row: dict[str, Any]) -> None:
+        """Add a row; a column that it does not name is null."""
+        self._held.append(row)
+        if len(self._held) == ROWS:
+            self._flush()
+
+    def add_batch(self, batch: pa.RecordBatch) -> None:
+        """Add rows as a row group of their own."""
+        self._writer.write_batch(batch)
+        self.rows += batch.num_rows
+
+    def _flush(self) -> None:
+        if self._held:
+            self.add_batch(pa.RecordBatch.from_pylist(self._held, self._schema))
+            self._held.clear()
+
+
+def export(job: Job, path: Path) -> str:
+    """Write the four tables; the recording is read once for the words and once for the verdicts."""
+    monitor = monitor_of(job)
+    path.mkdir()
+    with Table(path / "labels.parquet", SCHEMA) as labels, Table(path / "radials.parquet", RADIALS) as radials:
+
+        def words() -> Any:
+            for item in job.words():
+                if isinstance(item, Word708):
+                    radials.add(radial_row(item))
+                yield item
+
+        for batch in batches(words()):
+            labels.add_batch(batch)
+    with Table(path / "disparities.parquet", DISPARITIES) as pairs, Table(path / "verdicts.parquet", VERDICTS) as said:
+        for item in judged(job, monitor):
+            if isinstance(item, IntegrityEvent):
+                fields = vars(item)
+                said.add({"utc_ns": item.time_ns, **{name: fields[name] for name in VERDICTS.names if name in fields}})
+            else:
+                for row in disparity_rows(item, monitor):
+                    pairs.add(row)
+    return f"{labels.rows} labels, {radials.rows} radials, {pairs.rows} disparities, {said.rows} verdicts"
+
+
+def radial_row(word: Word708) -> dict[str, Any]:
+    """A radar word as a row: header fields where it has a header, bins (a byte each) where it is whole."""
+    row: dict[str, Any] = {
+        name: getattr(word, name) for name in ("utc_ns", "device_ns", "adapter", "channel", "flags", "bit_count")
+    }
+    readable = word.bit_count >= 8 * f.HEADER_708_BYTES and not word.flags & SPOILT & ~f.FLAG_WORD_LENGTH
+    if not word.reading or not readable:
+        return row
+    profile, array = word.reading.profile, np.frombuffer(word.data, np.uint8)[np.newaxis]
+    header = arinc708.headers(array, profile)
+    row |= {name: column[0].item() for name, column in header._asdict().items()}
+    row["label"] = f"{row['label']:03o}"
+    row["mode_name"] = profile.modes[row["mode"]]
+    row["gain_calibrated"] = bool(np.isnan(row["gain_db"]))
+    row["gain_db"] = None if row["gain_calibrated"] else row["gain_db"]
+    if word.bit_count == profile.word_bits:
+        radial = arinc708.unpack(array, profile)
+        row |= {"unusual": int(radial.unusual[0]), "bins": radial.bins[0].tobytes()}
+    return row
+
+
+def disparity_rows(item: Judged, monitor: Monitor) -> list[dict[str, Any]]:
+    """The pairs of shadows of a scan, found again in both threads as the monitor finds them."""
+    compared, settings = item.comparison, monitor.settings
+    if compared is None:
+        return []
+    sizes = settings.minimum_size, settings.maximum_size
+    seen = shadows(compared.radar_states, "radar", *sizes)
+    predicted = shadows(compared.dem_states, "dem", *sizes)
+    whole, foreseen = seen[~seen["range_limited"]], predicted[~predicted["range_limited"]]
+    pairs = pair(whole, foreseen)
+    columns = zip(
+        compared.scan_angle_deg[pairs["radial"]].tolist(),
+        whole["centre"][pairs["radar"]].tolist(),
+        foreseen["centre"][pairs["dem"]].tolist(),
+        compared.disparities.tolist(),
+        strict=True,
+    )
+    here = int(item.utc_ns.max()), item.scan.number
+    return [dict(zip(DISPARITIES.names, (*here, *values), strict=True)) for values in columns]
