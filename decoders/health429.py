@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from decoders import kernels429
 from decoders.arinc429 import Status, Values429
 from decoders.definitions import Definitions
 from decoders.formats import KIND_429_LOW
@@ -45,15 +46,6 @@ class _Rates:
         self.last_ns = np.zeros(256, np.int64)
         self.count = np.zeros(256, np.int64)
         self.ever = np.zeros(256, np.int64)
-
-    def feed(self, labels: npt.NDArray[np.uint8], time_ns: npt.NDArray[np.int64]) -> None:
-        """Take words (n,) in rising time."""
-        new = self.ever[labels] == 0
-        self.first_ns[labels[new][::-1]] = time_ns[new][::-1]  # of a label that comes again, the first one stays
-        self.last_ns[labels] = time_ns
-        came = np.bincount(labels, minlength=256)
-        self.count += came
-        self.ever += came
 
     def judged(self, labels: int | npt.NDArray[np.bool_]) -> None:
         """What came so far of a label, or of those of a mask (256,), is judged."""
@@ -107,17 +99,14 @@ class BusHealth:
         self, time_ns: npt.NDArray[np.int64], words: npt.NDArray[np.uint32], values: Values429
     ) -> Iterator[Finding]:
         """Take words of one second; what a box says of itself is judged at once."""
-        good = values.status != Status.BAD_PARITY
-        labels = values.label[good]
-        self._words += len(values.label)
-        sourced = good & self.has_sdi[values.label]
-        sdi = words[sourced] >> np.uint32(8) & np.uint32(3)
-        self._sources[values.label[sourced], sdi] = True
-        self._known["bad parity"] += len(values.label) - len(labels)
-        self._known["good"] += len(labels)
-        self._known["known"] += int(self._is_known[labels].sum())
-        self._known["known if turned"] += int(self._is_known[TURNED[labels]].sum())
-        self._rates.feed(labels, time_ns[good])
+        rates = self._rates
+        good, known, turned = kernels429.tally(
+            time_ns, words, values.label, values.status, self.has_sdi, self._is_known, TURNED, self._sources,
+            rates.first_ns, rates.last_ns, rates.count, rates.ever,
+        )  # fmt: skip
+        self._words += len(words)
+        for what, count in (("good", good), ("bad parity", len(words) - good), ("known", known), ("turned", turned)):
+            self._known[what] += count
         for said in values.value[(values.label == EQUIPMENT) & (values.status == Status.NORMAL)].astype(int).tolist():
             reason = f"the box says it is equipment {said:03X}, it is read as {self._definitions.name}"
             yield from self._tell("equipment", said & 0xFF != self._definitions.equipment_id & 0xFF, reason)
@@ -175,7 +164,7 @@ class BusHealth:
         noisy = f"parity is bad in {bad} of {good + bad} words: noise, or bits in another order"
         yield from self._tell("parity", _beyond(bad / (good + bad), *BAD_PARITY), noisy)
         if good:
-            known, turned = self._known["known"] / good, self._known["known if turned"] / good
+            known, turned = self._known["known"] / good, self._known["turned"] / good
             name, unclear = self._definitions.name, FEW <= known <= MORE
             order = (
                 f"{known:.0%} of the labels belong to {name}, {turned:.0%} if read the other way round: "

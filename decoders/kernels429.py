@@ -241,3 +241,29 @@ def _characters(raw: Int) -> Int:
             return INVALID
         rest >>= CHARACTER_BITS
     return raw
+
+
+@njit(cache=True)
+def tally(  # type: ignore[no-untyped-def] # typed by health429
+    time_ns, words, label, status, has_sdi, is_known, turned, sources, first_ns, last_ns, count, ever
+):
+    """Count decoded words in rising time by label (256,) and by source (256, 4).
+
+    Gives how many have a good parity, and of those how many have a known label, as they are and if turned round.
+    """
+    good = known = known_if_turned = 0
+    for i in range(words.size):
+        of = label[i]
+        if status[i] == BAD_PARITY:
+            continue
+        if has_sdi[of]:
+            sources[of, words[i] >> 8 & 3] = True
+        good += 1
+        known += is_known[of]
+        known_if_turned += is_known[turned[of]]
+        if not ever[of]:
+            first_ns[of] = time_ns[i]
+        last_ns[of] = time_ns[i]
+        count[of] += 1
+        ever[of] += 1
+    return good, known, known_if_turned

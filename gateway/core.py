@@ -5,7 +5,7 @@ interrupts and no more; the run ends with a non-zero exit all the same. A core t
 many, and its next verdict says so; the recording stays whole.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from gateway.events import Event
 from gateway.pipeline import Pipeline
@@ -35,6 +35,15 @@ class Core:
                 self._say(event)
         except Exception as error:  # noqa: BLE001 # a defect in decoding must not end the flight's monitoring
             self._failed(f"record {record.sequence}", error)
+            self._pipeline = self._build(self._pipeline)
+
+    def process_all(self, records: Sequence[Record]) -> None:
+        """Emit the events of many records, the same as one by one; a failure costs the rest of them."""
+        try:
+            for event in self._pipeline.feed_all(records):
+                self._say(event)
+        except Exception as error:  # noqa: BLE001 # as in process
+            self._failed(f"records {records[0].sequence} to {records[-1].sequence}", error)
             self._pipeline = self._build(self._pipeline)
 
     def finish(self) -> None:

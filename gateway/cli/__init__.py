@@ -16,6 +16,7 @@ from gateway.cli.export import export
 from gateway.cli.info import info
 from gateway.cli.labels import labels
 from gateway.cli.replay import replay
+from gateway.cli.reprocess import reprocess
 from gateway.cli.run import run
 from gateway.cli.simulate import simulate
 from gateway.cli.thresholds import thresholds
@@ -27,7 +28,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for verb in (demo, run, simulate, replay, dump, export, info, labels, thresholds, devices, doctor):
+for verb in (demo, run, simulate, replay, reprocess, dump, export, info, labels, thresholds, devices, doctor):
     app.command()(verb)
 
 decode = typer.Typer(help="Explain one bus word, field by field.", no_args_is_help=True)

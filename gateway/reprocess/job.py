@@ -1,0 +1,137 @@
+"""One recording to work out again: everything that its result depends on, and the work."""
+
+import hashlib
+import json
+from collections.abc import Iterable
+from functools import cache
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow as pa
+
+from gateway.config import RackConfig
+from gateway.core import Core
+from gateway.errors import GatewayError
+from gateway.events import Event, IntegrityEvent, ScanEvent, SummaryEvent
+from gateway.exports.parquet import VERDICTS
+from gateway.metadata import build_monitor, recorded_config, recorded_monitor
+from gateway.pipeline import Pipeline
+from gateway.recording import Recording
+from monitor.integrity import Monitor
+
+RECORDS_AT_ONCE = 1024
+CODE = ("decoders", "monitor", "gateway")  # whose sources decide what comes out
+OF_THE_SCAN = ("radials", pa.int64()), ("range_nm", pa.float64()), ("tilt_deg", pa.float64())
+COLUMNS = pa.schema([("recording", pa.string()), *OF_THE_SCAN, *VERDICTS])
+
+
+class Job(NamedTuple):
+    """A recording, as the data set names it and where it is, and what replaces the configuration that it was made with.
+
+    `config` is a whole configuration as JSON, or empty; `terrain` are files, or none.
+    """
+
+    name: str
+    path: Path
+    config: str = ""
+    terrain: tuple[Path, ...] = ()
+
+
+class Outcome(NamedTuple):
+    """A row for each verdict, and what is said of the whole recording."""
+
+    verdicts: pa.Table
+    whole: dict[str, Any]
+
+
+def key(job: Job) -> str:
+    """A digest of all that the outcome depends on: recording, configuration, calibration, terrain and code.
+
+    A file counts as the same while its size and time of change are. Raises GatewayError as `work` does.
+    """
+    recording = Recording(job.path)
+    config, monitor = _set_up(job, recording)
+    files = [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in recording.files]
+    calibration = monitor.calibration.model_dump_json() if monitor and monitor.calibration else ""
+    terrain = monitor.terrain.checksum if monitor else ""
+    said = [files, config.model_dump_json(), calibration, terrain, code_version()]
+    return hashlib.sha256(json.dumps(said).encode()).hexdigest()
+
+
+def work(job: Job) -> Outcome:
+    """Decode and judge a recording from its first record to its last. Raises GatewayError naming what is wrong."""
+    recording = Recording(job.path)
+    config, monitor = _set_up(job, recording)
+    rows: list[dict[str, Any]] = []
+    counters: dict[str, int] = {}
+    scan: ScanEvent | None = None
+
+    def take(event: Event) -> None:
+        nonlocal scan
+        if isinstance(event, ScanEvent):
+            scan = event
+        elif isinstance(event, IntegrityEvent):
+            rows.append(_row(job.name, event, scan if scan and scan.scan == event.scan else None))
+        elif isinstance(event, SummaryEvent):
+            counters.update(event.counters)
+
+    failures: list[str] = []
+    core = Core(lambda before: Pipeline(config, monitor, before=before), take, failures.append)
+    records = iter(recording)
+    first = last = None
+    while block := list(islice(records, RECORDS_AT_ONCE)):
+        first, last = first or block[0].stamp, block[-1].stamp
+        core.process_all(block)
+    core.finish()
+    whole = {
+        "recording": job.name,
+        "key": key(job),
+        "begins_utc_ns": first.utc_ns if first else None,
+        "seconds": (last.monotonic_ns - first.monotonic_ns) / 1e9 if first and last else 0.0,
+        "records": recording.records,
+        "damaged": recording.damaged,
+        "torn": recording.torn,
+        "failures": failures,
+        "counters": [{"name": name, "count": count} for name, count in counters.items()],
+    }
+    return Outcome(pa.Table.from_pylist(rows, COLUMNS), whole)
+
+
+def _set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
+    if not job.config:
+        config = recorded_config(recording.metadata)
+        return config, recorded_monitor(recording.metadata, config, job.terrain)
+    config = RackConfig.model_validate_json(job.config)
+    if job.terrain:
+        config = config.model_copy(update={"terrain": job.terrain})
+    return config, build_monitor(config)
+
+
+def _row(name: str, event: IntegrityEvent, scan: ScanEvent | None) -> dict[str, Any]:
+    row = {**vars(event), "recording": name, "utc_ns": event.time_ns}
+    if scan:
+        row |= {"radials": scan.radials, "range_nm": scan.range_nm, "tilt_deg": scan.tilt_deg}
+    return {column: row[column] for column in COLUMNS.names if column in row}
+
+
+@cache
+def code_version() -> str:
+    """A digest of the sources that decide what comes out of a recording."""
+    root = Path(__file__).parents[2]
+    digest = hashlib.sha256()
+    files = (path for package in CODE for path in (root / package).rglob("*") if path.suffix in (".py", ".toml"))
+    for path in sorted(files):
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def jobs(directory: Path, config: RackConfig | None, terrain: Iterable[Path]) -> list[Job]:
+    """A job for each recording below a directory. Raises GatewayError if there is none."""
+    paths = sorted(directory.rglob("*.mcap"))
+    if not paths:
+        raise GatewayError(f"{directory} holds no recordings (*.mcap): name the directory that they are in")
+    written = json.dumps(config.model_dump(mode="json")) if config else ""
+    files = tuple(path.absolute() for path in terrain)
+    names = [path.relative_to(directory).with_suffix("").as_posix() for path in paths]
+    return [Job(name, path.absolute(), written, files) for name, path in zip(names, paths, strict=True)]

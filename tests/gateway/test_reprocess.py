@@ -1,0 +1,190 @@
+"""Many recordings worked out again: what comes of them, where it lands, what is done anew, and a worker that dies."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import duckdb
+import pyarrow.parquet as pq
+import pytest
+
+from gateway.config import check_config
+from gateway.events import IntegrityEvent
+from gateway.metadata import build_monitor, describe, recorded_config, recorded_monitor
+from gateway.recording import Recorder, Recording
+from gateway.records import Raw, Record, Stamp, Status, Tick
+from gateway.replay import replay
+from gateway.reprocess import job as job_module
+from gateway.reprocess.dataset import DataSet
+from gateway.reprocess.job import Job, jobs, key, work
+from gateway.reprocess.run import reprocess
+from simulators.carriers import stream
+from simulators.link import units
+from simulators.scenario import BUILT_IN_TERRAIN, Radar, white_mountains
+from tests.gateway.shell import shadebus
+
+SWEEP_S = 61 * 3 / 40
+SECOND_NS = 1_000_000_000
+COUNT = 4
+
+
+def fly(path: Path, seed: int) -> None:
+    """Record a flight of two sweeps, in chunks of 20 ms."""
+    table = {"adapters": [{"name": "bridge", "source": "serial:x"}], "terrain": [BUILT_IN_TERRAIN["white_mountains"]]}
+    config = check_config(table, "test")
+    scenario = white_mountains(2 * SWEEP_S, seed=seed).model_copy(update={"radar": Radar(step_deg=3.0)})
+    chunks: dict[int, bytes] = {}
+    for ready_ns, data in units(scenario, stream()):
+        chunks[ready_ns // 20_000_000] = chunks.get(ready_ns // 20_000_000, b"") + data
+    records: list[Record] = [Status(0, Stamp(0, seed), "bridge", "UP")]
+    for chunk, data in chunks.items():
+        stamp = Stamp(chunk * 20_000_000, chunk * 20_000_000 + seed)
+        records.append(Raw(len(records), stamp, "bridge", data))
+        if chunk % 50 == 49:
+            records.append(Tick(len(records), stamp))
+    recorder = Recorder(path, describe(config, build_monitor(config)))
+    recorder.append(records)
+    recorder.close()
+
+
+@pytest.fixture(scope="module")
+def flights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("flights")
+    (directory / "second").mkdir()
+    for seed in range(COUNT):
+        fly(directory / ("second" if seed % 2 else "") / f"flight{seed}.mcap", seed)
+    return directory
+
+
+def said_by_replay(path: Path) -> list[tuple[object, ...]]:
+    recording = Recording(path)
+    config = recorded_config(recording.metadata)
+    found: list[tuple[object, ...]] = []
+
+    def take(event: object) -> None:
+        if isinstance(event, IntegrityEvent):
+            found.append((event.time_ns, event.scan, event.verdict, event.q, event.reasons))
+
+    replay(recording, config, recorded_monitor(recording.metadata, config), take, list[str]().append)
+    return found
+
+
+def test_the_verdicts_of_a_recording_are_those_of_its_replay(flights: Path) -> None:
+    for job in jobs(flights, None, ()):
+        rows = work(job).verdicts.to_pylist()
+        found = [(row["utc_ns"], row["scan"], row["verdict"], row["q"], tuple(row["reasons"])) for row in rows]
+        assert found == said_by_replay(job.path)
+        assert len(found) == 2
+
+
+def test_results_land_in_one_data_set_that_others_can_query(flights: Path, tmp_path: Path) -> None:
+    run = shadebus("reprocess", flights, "-o", tmp_path / "out")
+    assert run.returncode == 0, run.stderr
+    assert f"{COUNT} worked out, 0 held already" in run.stdout
+    found = duckdb.sql(
+        f"select recording, count(*) from '{tmp_path}/out/verdicts/**/*.parquet' group by recording order by recording"
+    )
+    assert found is not None
+    assert found.fetchall() == [("flight0", 2), ("flight2", 2), ("second/flight1", 2), ("second/flight3", 2)]
+    again = shadebus("reprocess", flights, "-o", tmp_path / "out")
+    assert f"0 worked out, {COUNT} held already" in again.stdout
+
+
+def bring_up(listed: list[Job], data: DataSet, scheduler: str | None = None) -> list[str]:
+    done = reprocess(listed, data, scheduler, lambda _n, _of: None)
+    assert done.failed == {}
+    return done.made
+
+
+def test_only_what_is_new_or_has_changed_is_done_again(
+    flights: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed, data = jobs(flights, None, ())[:2], DataSet(tmp_path)
+    data.put(listed[0].name, work(listed[0]))
+    assert data.has(listed[0].name, key(listed[0]))
+    assert not data.has(listed[1].name, key(listed[1]))
+    config = recorded_config(Recording(listed[0].path).metadata)
+    other = config.model_copy(update={"monitor": config.monitor.model_copy(update={"p_fa": 1e-3})})
+    changed = [
+        listed[0]._replace(config=json.dumps(other.model_dump(mode="json"))),
+        listed[0]._replace(terrain=(Path(__file__).parents[1] / "data/terrain/sierra_nevada_1arcsec_wgs84.tif",)),
+    ]
+    for job in changed:
+        assert not data.has(job.name, key(job))
+    before = key(listed[0])
+    os.utime(listed[0].path, ns=(1, 1))
+    assert key(listed[0]) != before
+    monkeypatch.setattr(job_module, "code_version", lambda: "other code")
+    data.put(listed[1].name, work(listed[1]))
+    monkeypatch.undo()
+    assert not data.has(listed[1].name, key(listed[1]))
+
+
+def test_one_recording_that_cannot_be_worked_out_costs_no_other(flights: Path, tmp_path: Path) -> None:
+    mixed = tmp_path / "mixed"
+    mixed.mkdir()
+    (mixed / "good.mcap").symlink_to(flights / "flight0.mcap")
+    (mixed / "none.mcap").write_bytes(b"no recording at all")
+    run = shadebus("reprocess", mixed, "-o", tmp_path / "out")
+    assert run.returncode == 1
+    assert "1 worked out" in run.stdout
+    assert "none: " in run.stderr
+    assert "is not a shadebus recording" in run.stderr
+
+
+def test_a_directory_without_recordings_and_a_scheduler_that_is_not_there_are_named(
+    tmp_path: Path, flights: Path
+) -> None:
+    empty = shadebus("reprocess", tmp_path, "-o", tmp_path / "out")
+    assert "holds no recordings" in empty.stderr
+    alone = shadebus("reprocess", flights, "-o", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:9")
+    assert "no Dask scheduler answers at tcp://127.0.0.1:9" in alone.stderr
+    assert (empty.returncode, alone.returncode) == (1, 1)
+
+
+class Cluster:
+    """A scheduler and two workers, each a process of its own, on loopback."""
+
+    def __init__(self, directory: Path) -> None:
+        self.file = directory / "scheduler.json"
+        self.processes = [self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")]
+        while not self.file.exists():
+            time.sleep(0.05)
+        self.address: str = json.loads(self.file.read_text())["address"]
+        worker = ("worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1")
+        self.processes += [self._start(*worker), self._start(*worker)]
+
+    def _start(self, *arguments: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "dask", *arguments, "--scheduler-file", str(self.file)]
+        return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    made = Cluster(tmp_path)
+    yield made
+    for process in made.processes:
+        process.kill()
+        process.wait()
+
+
+def test_on_a_cluster_whose_worker_is_killed_half_way_the_result_is_the_same(
+    flights: Path, tmp_path: Path, cluster: Cluster
+) -> None:
+    listed, data = jobs(flights, None, ()), DataSet(tmp_path / "out")
+
+    def kill_one(done: int, of: int) -> None:
+        if done == of // 2 and cluster.processes[1].poll() is None:
+            cluster.processes[1].send_signal(signal.SIGKILL)
+            cluster.processes[1].wait()
+
+    done = reprocess(listed, data, cluster.address, kill_one)
+    assert cluster.processes[1].returncode == -signal.SIGKILL
+    assert (done.failed, len(done.made)) == ({}, COUNT)
+    for job in listed:
+        assert pq.read_table(tmp_path / "out" / "verdicts" / f"{job.name}.parquet").equals(work(job).verdicts)
