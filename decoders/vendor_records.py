@@ -1,7 +1,7 @@
 """Records of makers' interface cards, as `shadebus import` keeps them, to packets.
 
 A chunk holds whole records, byte for byte as the maker's software wrote them; what is no record is skipped and counted.
-In radar words bit 0, the first on the wire, is the least significant bit of the first byte, and so of the first 16 bits.
+In radar words bit 0, the first on the wire, is the least significant bit of the first byte, so of the first 16 bits.
 """
 
 import struct
