@@ -10,7 +10,9 @@ SECOND_NS = 1_000_000_000
 ANEW_NS = SECOND_NS  # a time that steps back by more is of a clock that began anew, as to the pipeline
 LONGEST_PAUSE_NS = 86_400 * SECOND_NS  # and so is one that leaps ahead by more
 LATEST_NS = 1 << 62
-CHUNK_NS, CHUNK_BYTES = 10_000_000, 1 << 16  # what one chunk gathers
+CHUNK_BYTES = 1 << 16
+CHUNK_NS = 10_000_000  # what one chunk gathers
+SHARED_NS = 1_000_000  # and where files are laid beside each other by their stamps, as no chunk is in time but its end
 PAUSE_TICKS_NS = 10 * SECOND_NS  # so long ticks go on in a pause; then nothing has changed for them to tell
 
 
@@ -42,16 +44,20 @@ class Clock:
 
 
 class Records:
-    """Makes records of pieces. Each adapter's bytes of up to 10 ms are one chunk, stamped when its last piece came."""
+    """Makes records of pieces. Each adapter's bytes of a short while are one chunk with the time of its last piece."""
 
-    def __init__(self, adapters: Sequence[str], start_utc_ns: int, stamped: bool) -> None:
+    def __init__(
+        self, adapters: Sequence[str], start_utc_ns: int, *, stamped: bool = False, chunk_ns: int = CHUNK_NS
+    ) -> None:
         """`stamped` pieces have their stamp, a u64 of monotonic ns, put before them, as CAN frames are recorded."""
         self.clock = Clock()
         self._adapters = adapters
         self._start_utc_ns = start_utc_ns
         self._stamped = stamped
+        self._longest_ns = chunk_ns
         self._number = count()
         self._chunks: dict[str, bytearray] = {}
+        self._last_ns: dict[str, int] = {}  # of each chunk
         self._chunk_ns = 0  # when the oldest of them began
         self._tick_ns = SECOND_NS  # of the next tick
 
@@ -64,7 +70,7 @@ class Records:
             self.clock.advance(piece.time_ns)
             yield from self._until(before_ns, self.clock.elapsed_ns)
             yield from self._take(piece)
-        yield from self._flush(self.clock.elapsed_ns)
+        yield from self._flush()
         yield from (self._status(name, "CLOSED") for name in self._adapters)
 
     def note(self, text: str) -> Note:
@@ -73,8 +79,8 @@ class Records:
 
     def _until(self, before_ns: int, now_ns: int) -> Iterator[Record]:
         """What is due before a piece: chunks that are long enough, and ticks."""
-        if now_ns - self._chunk_ns > CHUNK_NS or now_ns >= self._tick_ns:
-            yield from self._flush(before_ns)
+        if now_ns - self._chunk_ns > self._longest_ns or now_ns >= self._tick_ns:
+            yield from self._flush()
         while self._tick_ns <= now_ns:
             if self._tick_ns > before_ns + PAUSE_TICKS_NS:
                 self._tick_ns = (now_ns // SECOND_NS + 1) * SECOND_NS
@@ -87,18 +93,20 @@ class Records:
         if piece.data:
             if not self._chunks:
                 self._chunk_ns = now_ns
+            self._last_ns[piece.adapter] = now_ns
             chunk = self._chunks.setdefault(piece.adapter, bytearray())
             chunk += (now_ns.to_bytes(8, "little") if self._stamped else b"") + piece.data
-            if piece.ends or len(chunk) >= CHUNK_BYTES:
-                yield from self._flush(now_ns)
+            if len(chunk) >= CHUNK_BYTES:
+                yield from self._flush()
         if piece.note:
+            yield from self._flush()
             yield self.note(piece.note)
         if piece.ends:
-            yield from self._flush(now_ns)
+            yield from self._flush()
 
-    def _flush(self, now_ns: int) -> Iterator[Record]:
-        for adapter, chunk in self._chunks.items():
-            yield Raw(next(self._number), self._stamp(now_ns), adapter, bytes(chunk))
+    def _flush(self) -> Iterator[Record]:
+        for adapter in sorted(self._chunks, key=self._last_ns.__getitem__):
+            yield Raw(next(self._number), self._stamp(self._last_ns[adapter]), adapter, bytes(self._chunks[adapter]))
         self._chunks.clear()
 
     def _status(self, adapter: str, state: str) -> Status:

@@ -15,7 +15,7 @@ from gateway.framing import form_of, record_framer
 from gateway.imports import Piece, candump
 from gateway.imports.files import Source, cut
 from gateway.imports.plan import Wish, rack_of
-from gateway.imports.records import Records
+from gateway.imports.records import CHUNK_NS, SHARED_NS, Records
 from gateway.link import FLAG_NAMES
 from gateway.metadata import build_monitor, describe
 from gateway.recording import Recorder
@@ -50,7 +50,9 @@ def import_files(wish: Wish, out: Path, obey: Callable[[Iterable[Record]], Itera
     elif not interfaces:
         opening.append(UTC_UNKNOWN)
     sources = [Source(path) for path in wish.files]
-    maker = Records([*names], start_utc_ns, stamped=bool(interfaces))
+    merged = len(names) > 1 and not interfaces
+    chunk_ns = SHARED_NS if merged else CHUNK_NS
+    maker = Records([*names], start_utc_ns, stamped=bool(interfaces), chunk_ns=chunk_ns)
     books = {adapter.name: Books(form_of(adapter).framer()) for adapter in config.adapters}
     recorder = Recorder(out, describe(config, build_monitor(config)))
     try:
