@@ -1,10 +1,8 @@
 """Files of other recorders: their bytes are kept, and replay gives the words, times and verdicts that were in them."""
 
 import hashlib
-import struct
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -19,12 +17,11 @@ from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, Summary
 from gateway.imports.plan import Wish, channels_of, flags_of, utc_ns
 from gateway.imports.records import Clock
 from gateway.imports.run import import_files
-from gateway.metadata import recorded_config, recorded_monitor
+from gateway.metadata import recorded_config
 from gateway.recording import Recording
-from gateway.records import Note, Raw, Record, Tick
-from gateway.replay import replay
-from simulators import arinc429
+from gateway.records import Raw, Record, Tick
 from tests.gateway.conftest import TERRAIN
+from tests.gateway.importing import events, imported, notes, pitch_word, summary
 from tests.gateway.live import raw_records, recorded_bytes, records
 from tests.gateway.made import only
 from tests.gateway.shell import shadebus
@@ -39,42 +36,8 @@ terrain = ["{TERRAIN}"]
 name = "bridge"
 source = "serial:/dev/x"
 """
-PITCH, PITCH_LSB = 0o324, 180 / 2**14  # 14 bits and sign, of +-180 degrees
-
-
-def imported(tmp_path: Path, layout: str, *contents: bytes, **wish: Any) -> Path:
-    files = []
-    for k, content in enumerate(contents):
-        files.append(tmp_path / f"file{k}.bin")
-        files[-1].write_bytes(content)
-    out = tmp_path / "out.mcap"
-    import_files(Wish(files, layout, **wish), out, passing)
-    return out
-
-
-def passing(items: Iterable[Record]) -> Iterator[Record]:
-    return iter(items)
-
-
-def events(path: Path) -> list[Event]:
-    recording, found, failures = Recording(path), list[Event](), list[str]()
-    config = recorded_config(recording.metadata)
-    replay(recording, config, recorded_monitor(recording.metadata, config), found.append, failures.append)
-    assert failures == []
-    return found
-
-
-def summary(path: Path) -> dict[str, int]:
-    (last,) = only(SummaryEvent, events(path))
-    return last.counters
-
-
-def notes(path: Path) -> list[str]:
-    return [record.text for record in records(path) if isinstance(record, Note)]
-
-
-def pitch_word(degrees: float) -> bytes:
-    return struct.pack("<I", arinc429.encode(PITCH, degrees))
+PITCH_LSB = 180 / 2**14  # of label 324: 14 bits and sign, of +-180 degrees
+FRAME = b"(1780000000.000100) can0 1601008B#8B800C6060E31600\n"
 
 
 @pytest.fixture(scope="session")
@@ -200,58 +163,12 @@ def test_errors_that_the_card_saw_are_counted_and_its_words_not_used(tmp_path: P
     )
 
 
-LOG = b"""(1780000000.000100) can0 1601008B#8B800C6060E31600
-(1780000000.000300) can1 123#0102
-(1780000000.000500) can0 16012000#0200000002000000
-(1780000000.000600) can0 16001000##10580B386590000000040
-what is this
-(1780000000.000700) can0 20000004#0001000000000000
-(1780000001.000800) can0 123#R2
-(1780000001.000900) can0 1601008B#8B800C6061E31600 R
-"""
-
-
-def test_candump_frames_are_recorded_as_a_can_adapter_records_them(tmp_path: Path) -> None:
-    out = imported(tmp_path, "candump", LOG)
-    can0 = recorded_bytes(out, "can0")
-    word, second = bytes.fromhex("8b800c6060e31600"), bytes.fromhex("8b800c6061e31600")
-    assert can0 == b"".join(
-        (
-            struct.pack("<QIBB", 0, 0x9601008B, 0, 8) + word,
-            struct.pack("<QIBB", 400_000, 0x96012000, 0, 8) + bytes.fromhex("0200000002000000"),
-            struct.pack("<QIBB", 500_000, 0x96001000, 5, 10) + bytes.fromhex("0580b386590000000040"),
-            struct.pack("<QIBB", 600_000, 0x20000004, 0, 8) + bytes.fromhex("0001000000000000"),
-            struct.pack("<QIBB", 1_000_700_000, 0x40000123, 0, 2) + bytes(2),
-            struct.pack("<QIBB", 1_000_800_000, 0x9601008B, 0, 8) + second,
-        )
-    )
-    assert recorded_bytes(out, "can1") == struct.pack("<QIBB", 200_000, 0x123, 0, 2) + b"\1\2"
-    stamps = [record.stamp.utc_ns for record in raw_records(out)]
-    # each chunk has the time of its last frame; the note of a strange line and the second's end cut them
-    assert [stamp - 1_780_000_000_000_000_000 for stamp in stamps] == [300_000, 600_000, 700_000, 1_000_900_000]
-    assert "no frame: what is this" in notes(out)
-    found = summary(out)
-    assert (found["can0.words_429"], found["can0.foreign_frames"], found["can0.error_frames"]) == (2, 1, 1)
-    assert found["can1.foreign_frames"] == 1
-
-
-def test_words_of_a_candump_log_are_read_with_the_definitions_that_are_given(tmp_path: Path) -> None:
-    lines = []
-    for k in range(50):
-        word, time_us = pitch_word(2.5), 50_000 * k
-        data = (word + struct.pack("<I", time_us)).hex().upper()
-        lines.append(f"({1_780_000_000 + time_us / 1e6:.6f}) vcan0.1 16040{word[0]:03X}#{data}\n".encode())
-    out = imported(tmp_path, "candump", b"".join(lines), channels=channels_of(["4=arinc429:iru_704"]))
-    assert only(StateEvent, events(out))[-1].values["pitch_deg"] == pytest.approx(2.5, abs=0.01)
-    assert {record.adapter for record in raw_records(out)} == {"vcan0_1"}
-
-
 @pytest.mark.parametrize("layout", ["seqrecord", "mxf", "rdr4b", "candump"])
 @given(garbage=st.binary(min_size=1, max_size=3000))
 def test_garbage_is_kept_counted_and_never_a_crash(
     layout: str, garbage: bytes, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    content = LOG[:51] + garbage if layout == "candump" else garbage
+    content = FRAME + garbage if layout == "candump" else garbage
     channels = channels_of(["0=arinc708"])
     out = imported(tmp_path_factory.mktemp("garbage"), layout, content, channels=channels)
     assert only(SummaryEvent, events(out))
@@ -383,6 +300,17 @@ def test_a_disk_that_is_full_is_named_and_nothing_half_is_left(tmp_path: Path, m
     with pytest.raises(GatewayError, match=r"cannot write .*out\.mcap: No space left on device; choose another"):
         imported(tmp_path, "rdr4b", bytes(218))
     assert not (tmp_path / "out.mcap").exists()
+
+
+def test_an_import_that_is_stopped_leaves_nothing(tmp_path: Path) -> None:
+    def stopped(items: Iterable[Record]) -> Iterator[Record]:
+        yield next(iter(items))
+        raise SystemExit(130)
+
+    (tmp_path / "in.bin").write_bytes(bytes(218))
+    with pytest.raises(SystemExit):
+        import_files(Wish([tmp_path / "in.bin"], "rdr4b"), tmp_path / "out.mcap", stopped)
+    assert [path.name for path in tmp_path.iterdir()] == ["in.bin"]
 
 
 def test_an_imported_recording_is_raw_records_statuses_ticks_and_notes_in_order(
