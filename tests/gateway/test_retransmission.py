@@ -126,8 +126,9 @@ def test_over_udp_each_datagram_goes_out_by_itself(scenario: Scenario, make_rack
     first = recorded(tmp_path / "first.mcap", rack, grouped)
     with Live(rack) as live:
         live.wait_for("status", state="UP")
-        with Transmitting(first, source, "--speed", SPEED) as line:
-            told = line.end()
+        told = transmitted(
+            first, "--to", source, "--speed", SPEED
+        )  # here, lest the radar is quiet while a process starts
         wait_until(lambda: len(words(live.path)) == len(words(first)), "all words")
     assert told.startswith(f"{len(chunks)} datagrams, ")
     assert [data for record in raw_records(live.path) for _, data in split(record.data)] == [d[10:] for _, d in chunks]
