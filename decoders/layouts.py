@@ -1,4 +1,6 @@
-"""Byte layouts as `construct` declarations: the executable specification of RackLink 1 and of the ARINC 708 header.
+"""Byte layouts as `construct` declarations: the executable specification of all that is not read with them.
+
+RackLink 1, the ARINC 708 header, and the records of makers' interface cards.
 
 They are written field by field in the order of the wire, apart from the tables of `decoders.formats`, so that the
 fast readers can be tested against something that was not derived from them. In service they read only the rare packets.
@@ -51,6 +53,49 @@ TIME_MARK = Struct("edge_time_ns" / Int64ul, Terminated)
 WORDS_429 = Struct("words" / GreedyRange(Struct("offset_ns" / Int32ul, "word" / Int32ul)), Terminated)
 
 WORD_708 = Struct("bit_count" / Int16ul, "data" / Bytes((this.bit_count + 7) // 8), Terminated)
+
+
+SEQRECORD_429 = Struct(
+    "type" / Int16ul,
+    "count" / Int16ul,
+    "timestamp" / Int32ul,
+    "activity" / Int16ul,
+    "decoder_gap" / Int16ul,
+    "data" / Int32ul,
+    "timestamp_high" / Int32ul,
+)
+
+SEQRECORD_708 = Struct(
+    "type" / Int16ul,
+    "count" / Int16ul,
+    "timestamp" / Int32ul,
+    "activity" / Int16ul,
+    "data_count" / Int16ul,
+    "data" / Int16ul[100],
+    "extra" / Int16ul[16],
+    "bit_count" / Int16ul,
+    "reserved" / Int16ul,
+    "timestamp_high" / Int32ul,
+)
+
+MXF_A429 = Struct(
+    "time_tag" / Int64ul,
+    "control" / Int32ul,
+    "repeat_count" / Int32ul,
+    "data" / Int32ul,
+    "reserved" / Int32ul,
+)
+
+MXF_A708 = Struct(
+    "time_tag" / Int64ul,
+    "control" / Int32ul,
+    "data_size" / Int32ul,
+    "repeat_count" / Int32ul,
+    "manchester_bit_error" / Int32ul,
+    "data" / Int16ul[128],
+)
+
+RDR4B = Struct("prefix" / Bytes(18), "data" / Bytes(200))
 
 
 def _lsb_first(width: int) -> "Construct[Any, Any]":

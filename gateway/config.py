@@ -114,6 +114,20 @@ def _not_ours(name: str) -> str:
     return name
 
 
+FlagName = Literal["parity", "coding", "word_length", "sync"]  # as RackLink has them
+Mask = Annotated[int, Field(ge=0, le=0xFFFF_FFFF)]
+
+
+class VendorConfig(_Section):
+    """What a file of an interface card leaves open; where nothing is said, the layout's usual value is taken."""
+
+    tick_ns: int | None = Field(None, ge=1, le=1_000_000_000, description="of the card's clock")
+    flags_429: dict[FlagName, Mask] | None = Field(None, description="the card's bits that mean it, by our flag")
+    flags_708: dict[FlagName, Mask] | None = Field(None, description="the same of radar words")
+    size_bits: Literal[1, 8, 16] | None = Field(None, description="what MXF's dataSize counts: bits, bytes or words")
+    words_per_s: float | None = Field(None, gt=0, le=1e6, description="of an RDR-4B's file, which has no times")
+
+
 class AdapterConfig(_Section):
     """One bridge: its name in the recording and where it is."""
 
@@ -121,18 +135,26 @@ class AdapterConfig(_Section):
     source: str = Field(
         pattern=r"^[a-z0-9]+:.+",
         description="serial:DEVICE, serial:socket://..., serial:rfc2217://..., usb:VID:PID:SERIAL, "
-        "can:INTERFACE:CHANNEL, udp:HOST:PORT",
+        "can:INTERFACE:CHANNEL, udp:HOST:PORT; file:NAME of what was imported",
     )
-    framing: Literal["racklink", "bare708"] = Field(
-        "racklink", description="bare708 for a UDP sender whose datagrams are radar words and nothing else"
+    framing: Literal["racklink", "bare708", "candump", "seqrecord", "mxf429", "mxf708", "rdr4b"] = Field(
+        "racklink",
+        description="bare708 for a UDP sender whose datagrams are radar words and nothing else; "
+        "candump and the rest for files that were imported",
     )
     baud: int = Field(921_600, ge=300, le=12_000_000, description="bit/s of a serial line")
     channels: dict[ChannelNumber, ChannelConfig] = Field(default_factory=dict, description="by channel number")
+    vendor: VendorConfig = VendorConfig()
 
     @model_validator(mode="after")
-    def _bare_words_come_by_udp(self) -> Self:
-        if self.framing == "bare708" and not self.source.startswith("udp:"):
+    def _the_source_can_have_the_framing(self) -> Self:
+        kind = self.source.partition(":")[0]
+        if self.framing == "bare708" and kind != "udp":
             raise ValueError('framing "bare708" is for udp sources: leave it out')
+        if kind == "file" and self.framing in ("racklink", "bare708"):
+            raise ValueError("file: is what `shadebus import` has read: name a device, or set the file's framing")
+        if kind != "file" and self.framing not in ("racklink", "bare708"):
+            raise ValueError(f"framing {self.framing!r} is for files that are imported: leave it out")
         return self
 
 

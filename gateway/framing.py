@@ -1,13 +1,16 @@
 """Which framer reads what an adapter has recorded."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
+from decoders import formats, vendors
 from decoders.can_frames import Recorded, Slcan, Socketcand
 from decoders.datagrams import BareFramer, DatagramFramer
 from decoders.framing import PacketFramer
 from decoders.racklink import Framer
 from decoders.racklink_can import CanFramer
+from decoders.vendor_records import FRAMERS, RecordFramer
 from gateway.config import AdapterConfig
 
 
@@ -32,6 +35,17 @@ CAN_TEXTS = {
     "socketcand": Form(lambda: CanFramer(Socketcand()), "bytes", FRAMES, checked=False),
 }
 CAN = Form(lambda: CanFramer(Recorded()), "frames", FRAMES)
+RECORDS = "check that the file is of the layout that it was imported from"
+
+
+def record_framer(config: AdapterConfig) -> RecordFramer:
+    """The framer of an imported file, with what the configuration says beyond the layout."""
+    said = config.vendor.model_dump(exclude_none=True)
+    for name in ("flags_429", "flags_708"):
+        if name in said:
+            said[name] = {getattr(formats, f"FLAG_{flag.upper()}"): mask for flag, mask in said[name].items()}
+    reading = replace(vendors.READINGS[config.framing], **said)
+    return FRAMERS[config.framing](reading, next(iter(config.channels), 0))
 
 
 def form_of(config: AdapterConfig) -> Form:
@@ -39,6 +53,10 @@ def form_of(config: AdapterConfig) -> Form:
     kind, _, address = config.source.partition(":")
     if kind == "udp":
         return DATAGRAMS[config.framing]
+    if kind == "file" and config.framing != "candump":
+        return Form(lambda: record_framer(config), "bytes", RECORDS)
+    if kind == "file":
+        return CAN
     if kind == "can":
         return CAN_TEXTS.get(address.partition(":")[0], CAN)
     return STREAM

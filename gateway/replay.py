@@ -2,15 +2,22 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from itertools import groupby, islice
 
 from gateway.config import RackConfig
 from gateway.core import Core, Emit
 from gateway.errors import GatewayError
-from gateway.events import Event
+from gateway.events import Event, IntegrityEvent, ScanEvent
 from gateway.pipeline import Pipeline, Watcher
 from gateway.recording import Recording
+from gateway.records import Raw, Record, Status
 from monitor.integrity import Monitor
+
+RECORDS_AT_ONCE = 256  # as fast as possible
+
+Wait = Callable[[threading.Event], None]
 
 
 def replay(
@@ -25,42 +32,104 @@ def replay(
     start_s: float = 0.0,
     stop_s: float | None = None,
     stop: threading.Event | None = None,
+    names: Mapping[str, str] | None = None,
+    step: Wait | None = None,
 ) -> int:
     """Emit the events of a recording, as fast as possible or at `speed` times real time; return the core's failures.
 
     `start_s` and `stop_s` count from the first record. What lies before `start_s` is fed all the same, since what comes
     later depends on it, but its events are not emitted. `stop` ends the replay between two records, without a summary.
+    `names` gives adapters, which `config` must know by them, other names than the recording does. `step` is called
+    before each scan is emitted, and before a verdict without one; time at `speed` stands still meanwhile.
     Raises what `emit` raised, and GatewayError if `start_s` lies past the end.
     """
-    begun = False
-
-    def emit_once_begun(event: Event) -> None:
-        if begun:
-            emit(event)
-
-    core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit_once_begun, report)
     halt = stop or threading.Event()
-    began_ns = time.monotonic_ns()
-    first_ns: int | None = None
+    pace = _Pace(speed, start_s, halt)
+    gate = _Gate(emit, step, halt, pace)
+    core = Core(lambda before: Pipeline(config, monitor, watcher, before), gate.emit, report)
+    at_once = 1 if speed or step else RECORDS_AT_ONCE
     elapsed_s = 0.0
-    for record in recording:
-        first_ns = record.stamp.monotonic_ns if first_ns is None else first_ns
-        elapsed_s = (record.stamp.monotonic_ns - first_ns) / 1e9
-        if stop_s is not None and elapsed_s > stop_s:
-            break
-        if not begun and elapsed_s >= start_s:
-            begun, began_ns = True, time.monotonic_ns()
-        if begun and speed:
-            halt.wait(max(0.0, (elapsed_s - start_s) / speed - (time.monotonic_ns() - began_ns) / 1e9))
-        if halt.is_set():
-            return core.failures
-        core.process(record)
-        if core.unheard:
-            raise core.unheard
-    else:
-        if first_ns is not None and not begun:
-            raise GatewayError(f"{recording.path} is only {elapsed_s:.1f} s long: start before its end")
+    timed = _timed(recording, stop_s)
+    for begun, shown in groupby(timed, lambda item: item[0] >= start_s):
+        gate.open = begun
+        while block := list(islice(shown, at_once)):
+            elapsed_s = block[-1][0]
+            if begun:
+                pace.wait(block[0][0])
+            if halt.is_set():
+                return core.failures
+            core.process_all([_renamed(record, names or {}) for _, record in block])
+            if core.unheard:
+                raise core.unheard
+    if recording.records and not gate.open and (stop_s is None or stop_s >= start_s):
+        raise GatewayError(f"{recording.path} is only {elapsed_s:.1f} s long: start before its end")
+    if halt.is_set():  # while a scan waited for its turn
+        return core.failures
     core.finish()
     if core.unheard:
         raise core.unheard
     return core.failures
+
+
+def _timed(recording: Recording, stop_s: float | None) -> Iterator[tuple[float, Record]]:
+    """The records with their seconds since the first, up to `stop_s`."""
+    first_ns: int | None = None
+    for record in recording:
+        first_ns = record.stamp.monotonic_ns if first_ns is None else first_ns
+        elapsed_s = (record.stamp.monotonic_ns - first_ns) / 1e9
+        if stop_s is not None and elapsed_s > stop_s:
+            return
+        yield elapsed_s, record
+
+
+class _Pace:
+    """Real time, or a multiple of it, from the first record that is shown."""
+
+    def __init__(self, speed: float | None, start_s: float, halt: threading.Event) -> None:
+        self._speed = speed
+        self._start_s = start_s
+        self._halt = halt
+        self._began_ns: int | None = None
+
+    def wait(self, elapsed_s: float) -> None:
+        """Return when the record's time has come, or at the order to stop."""
+        self._began_ns = time.monotonic_ns() if self._began_ns is None else self._began_ns
+        if self._speed:
+            due_s = (elapsed_s - self._start_s) / self._speed
+            self._halt.wait(max(0.0, due_s - (time.monotonic_ns() - self._began_ns) / 1e9))
+
+    def stand_still(self, since_ns: int) -> None:
+        """What has passed since then does not count."""
+        if self._began_ns is not None:
+            self._began_ns += time.monotonic_ns() - since_ns
+
+
+class _Gate:
+    """Lets events through once it is open, scans and their verdicts one step at a time if there are steps."""
+
+    def __init__(self, emit: Emit, step: Wait | None, halt: threading.Event, pace: _Pace) -> None:
+        self.open = False
+        self._emit = emit
+        self._step = step
+        self._halt = halt
+        self._pace = pace
+        self._scan: int | None = None  # the one that was let through last
+
+    def emit(self, event: Event) -> None:
+        """Emit an event, or not; after the order to stop nothing more."""
+        if not self.open:
+            return
+        if self._step and isinstance(event, ScanEvent | IntegrityEvent) and event.scan != self._scan:
+            began_ns = time.monotonic_ns()
+            self._step(self._halt)
+            self._pace.stand_still(began_ns)
+            self._scan = event.scan
+        if not (self._step and self._halt.is_set()):
+            self._emit(event)
+
+
+def _renamed(record: Record, names: Mapping[str, str]) -> Record:
+    """The record under the new name of its adapter."""
+    if isinstance(record, Raw | Status) and record.adapter in names:
+        return replace(record, adapter=names[record.adapter])
+    return record

@@ -29,11 +29,12 @@ from simulators.racklink import Packet
 
 
 class Frame(NamedTuple):
-    """A CAN data frame with a 29-bit identifier."""
+    """A CAN data frame with a 29-bit identifier, or with one of 11 bits that is not a bridge's."""
 
     id: int
     data: bytes
     fd: bool
+    extended: bool = True
 
 
 Unit = TypeVar("Unit", bytes, Frame)
@@ -66,12 +67,16 @@ def can(fd: bool = False) -> Carrier[Frame]:
 def slcan(fd: bool = False) -> Carrier[bytes]:
     """CAN frames as the text lines of a serial CAN adapter; FD frames have the bit rate switched."""
     frames = _Framer(fd).frames
-    return Carrier("slcan", lambda packet: [_line(frame) for frame in frames(packet)])
+    return Carrier("slcan", lambda packet: [slcan_line(frame) for frame in frames(packet)])
 
 
-def _line(frame: Frame) -> bytes:
+def slcan_line(frame: Frame) -> bytes:
+    """The frame as text. Raises ValueError for a number of data bytes that CAN does not have."""
     length = CAN_FD_LENGTHS.index(len(frame.data))
-    return f"{'B' if frame.fd else 'T'}{frame.id:08X}{length:X}{frame.data.hex().upper()}\r".encode()
+    command, digits = ("B" if frame.fd else "T"), 8
+    if not frame.extended:
+        command, digits = command.lower(), 3
+    return f"{command}{frame.id:0{digits}X}{length:X}{frame.data.hex().upper()}\r".encode()
 
 
 class _Framer:

@@ -55,6 +55,8 @@ class Adapter(Protocol):
 def make_adapter(config: AdapterConfig) -> Adapter:
     """The adapter that a source such as `serial:/dev/ttyUSB0` names."""
     kind, _, address = config.source.partition(":")
+    if kind == "file":
+        raise GatewayError(f"source {config.source!r} is a file that was imported, no line: `shadebus replay` plays it")
     if kind not in KINDS:
         raise GatewayError(f"source {config.source!r}: unknown kind {kind!r}, use one of {', '.join(KINDS)}")
     adapter: Adapter = import_module(KINDS[kind]).make(address, config)

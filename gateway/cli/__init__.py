@@ -13,6 +13,7 @@ from gateway.cli.devices import devices
 from gateway.cli.doctor import doctor
 from gateway.cli.dump import dump
 from gateway.cli.export import export
+from gateway.cli.importing import import_
 from gateway.cli.info import info
 from gateway.cli.labels import labels
 from gateway.cli.replay import replay
@@ -30,6 +31,7 @@ app = typer.Typer(
 )
 for verb in (demo, run, simulate, replay, reprocess, dump, export, info, labels, thresholds, devices, doctor):
     app.command()(verb)
+app.command("import")(import_)
 
 decode = typer.Typer(help="Explain one bus word, field by field.", no_args_is_help=True)
 decode.command("429")(decode_429)

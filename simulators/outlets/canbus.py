@@ -39,7 +39,11 @@ class CanOutlet(Closing):
     def write(self, frame: Frame) -> None:
         """Send one frame, however long the bus takes; raises Closed once `close` was called."""
         message = can.Message(
-            arbitration_id=frame.id, is_extended_id=True, data=frame.data, is_fd=frame.fd, bitrate_switch=frame.fd
+            arbitration_id=frame.id,
+            is_extended_id=frame.extended,
+            data=frame.data,
+            is_fd=frame.fd,
+            bitrate_switch=frame.fd,
         )
         stalled_s = time.monotonic() + STALL_S
         while not self._sent(message):

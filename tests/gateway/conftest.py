@@ -50,3 +50,9 @@ def make_rack(tmp_path: Path) -> MakeRack:
         return check_config({**table, **changes}, "test")
 
     return make
+
+
+@pytest.fixture
+def signals_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A verb that runs in this process must not take the signals of the tests."""
+    monkeypatch.setattr("gateway.stopping.signal.signal", lambda *_: None)

@@ -19,6 +19,7 @@ VERBS = (
     "run",
     "simulate",
     "replay",
+    "import",
     "dump",
     "export",
     "info",

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway import pipeline
+from gateway import hearing
 from monitor.calibration import uncalibrated
 from simulators.outlets import PtyOutlet
 from simulators.player import play
@@ -139,7 +139,7 @@ def test_a_remote_line_is_recorded_like_a_near_one(stream: bytes, make_rack: Mak
 def test_a_source_that_falls_quiet_is_told_and_heard_again(
     stream: bytes, make_rack: MakeRack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "QUIET_NS", 1_200_000_000)
+    monkeypatch.setattr(hearing, "QUIET_NS", 1_200_000_000)
     with PtyOutlet() as line, Live(make_rack(f"serial:{line.path}", terrain=[TERRAIN])) as live:
         live.wait_for("status", state="UP")
         line.write(stream)

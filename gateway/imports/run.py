@@ -1,0 +1,136 @@
+"""`shadebus import`: files to a recording, in one pass (two for candump, whose interfaces must be known first)."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from heapq import merge
+from itertools import islice
+from pathlib import Path
+
+from decoders import formats as f
+from decoders.framing import PacketFramer
+from gateway.config import AdapterConfig, RackConfig
+from gateway.errors import GatewayError
+from gateway.framing import form_of, record_framer
+from gateway.imports import Piece, candump
+from gateway.imports.files import Source, cut
+from gateway.imports.plan import Wish, rack_of
+from gateway.imports.records import CHUNK_NS, SHARED_NS, Records
+from gateway.link import FLAG_NAMES
+from gateway.metadata import build_monitor, describe
+from gateway.recording import Recorder
+from gateway.records import Raw, Record
+
+BATCH = 256
+UTC_UNKNOWN = "the files say no UTC and --start-utc is not given: stamps count from 1970-01-01"
+ASSUMED = {
+    "seqrecord": "{tick_ns} ns a tick of the card's clock; the high byte of activity is the channel",
+    "mxf429": "{tick_ns} ns a tick of the card's clock; masks of control {flags_429}",
+    "mxf708": "{tick_ns} ns a tick of the card's clock; dataSize in units of {size_bits} bits; "
+    "masks of control {flags_708}",
+    "rdr4b": "the file has no times: {words_per_s:g} words a second, as if none were missing",
+}
+
+
+def import_files(wish: Wish, out: Path, obey: Callable[[Iterable[Record]], Iterator[Record]]) -> dict[str, int]:
+    """Make the recording `out`; counters of what is in it, by adapter. `obey` passes the records on until it is to end.
+
+    Raises GatewayError for files that cannot be read and for what contradicts itself; then there is no recording.
+    """
+    sources = [Source(path) for path in wish.files]
+    interfaces: dict[str, str] = {}
+    start_utc_ns = 0
+    if wish.layout == "candump":
+        interfaces, start_utc_ns = candump.survey(sources)
+    names = _names(wish, interfaces)
+    config = rack_of(wish, names)
+    opening = [] if interfaces else [_assumed(adapter) for adapter in config.adapters]
+    if wish.start_utc_ns is not None:
+        start_utc_ns = wish.start_utc_ns
+    elif not interfaces:
+        opening.append(UTC_UNKNOWN)
+    sources = [Source(path) for path in wish.files]
+    merged = len(names) > 1 and not interfaces
+    chunk_ns = SHARED_NS if merged else CHUNK_NS
+    maker = Records([*names], start_utc_ns, stamped=bool(interfaces), chunk_ns=chunk_ns)
+    books = {adapter.name: Books(form_of(adapter).framer()) for adapter in config.adapters}
+    recorder = Recorder(out, describe(config, build_monitor(config)))
+    try:
+        made = maker.made(_pieces(config, sources, interfaces), opening)
+        _write(recorder, obey(made), books)
+        recorder.append([maker.note(source.told) for source in sources])
+        recorder.close()
+    except BaseException as error:
+        with suppress(OSError):
+            out.unlink()  # what is not whole would look as if it were
+        if isinstance(error, OSError):
+            raise GatewayError(f"cannot write {out}: {error.strerror}; choose another place") from error
+        raise
+    clock = {"steps_back_in_time": maker.clock.steps_back, "clocks_begun_anew": maker.clock.begun_anew}
+    return clock | {f"{name}.{key}": n for name, book in books.items() for key, n in book.counters().items()}
+
+
+class Books:
+    """What a replay will find in the chunks of an adapter."""
+
+    def __init__(self, framer: PacketFramer) -> None:
+        self._framer = framer
+        self._words: Counter[str] = Counter()
+
+    def take(self, data: bytes) -> None:
+        """Count the packets and words of a chunk."""
+        for packet in self._framer.feed(data):
+            if packet.type == f.WORDS_429:
+                self._words["words_429"] += len(packet.body) // 8
+                self._words["words_429_flagged"] += len(packet.body) // 8 if packet.flags else 0
+            elif packet.type == f.WORD_708:
+                self._words["words_708"] += 1
+                self._words["words_708_flagged"] += packet.flags > 0
+
+    def counters(self) -> dict[str, int]:
+        """Every counter by name."""
+        return self._framer.counters() | self._words
+
+
+def _assumed(adapter: AdapterConfig) -> str:
+    """What the recording is to say of what its layout leaves open."""
+    reading = vars(record_framer(adapter).reading)
+    masks = {
+        name: ", ".join(f"{FLAG_NAMES[flag]} 0x{mask:x}" for flag, mask in reading[name].items()) or "none"
+        for name in ("flags_429", "flags_708")
+    }
+    return f"assumed of {adapter.name}: {ASSUMED[adapter.framing].format(**reading | masks)}"
+
+
+def _names(wish: Wish, interfaces: Mapping[str, str]) -> dict[str, str]:
+    """The adapters to be made, each with the place that its source names."""
+    if interfaces:
+        return {name: interface for interface, name in interfaces.items()}
+    if wish.layout != "mxf":
+        return {wish.layout: ",".join(path.name for path in wish.files)}
+    if len(wish.channels) != len(wish.files):
+        raise GatewayError(
+            f"mxf records do not say their channel: give a --channel for each file, in the same order "
+            f"({len(wish.files)} files, {len(wish.channels)} channels)"
+        )
+    return {f"mxf{k}": path.name for k, path in enumerate(wish.files)}
+
+
+def _pieces(config: RackConfig, sources: list[Source], interfaces: dict[str, str]) -> Iterator[Piece]:
+    """All that is in the files. Those of records that say their channel follow one another, others are merged."""
+    if interfaces:
+        return candump.frames(sources, interfaces)
+    if len(config.adapters) == 1:
+        (adapter,) = config.adapters
+        return cut(sources, adapter.name, record_framer(adapter))
+    pairs = zip(config.adapters, sources, strict=True)
+    files = [cut([source], adapter.name, record_framer(adapter)) for adapter, source in pairs]
+    return merge(*files, key=lambda piece: piece.time_ns or 0)
+
+
+def _write(recorder: Recorder, records: Iterator[Record], books: Mapping[str, Books]) -> None:
+    while batch := [*islice(records, BATCH)]:
+        recorder.append(batch)
+        for record in batch:
+            if isinstance(record, Raw):
+                books[record.adapter].take(record.data)
