@@ -161,6 +161,12 @@ def _one_by_one(equipment: int) -> NDArray[np.bool_]:
     )
 
 
+@cache
+def _used(equipment: int) -> NDArray[np.bool_]:
+    """By label (256,), whether anything is made of its words."""
+    return np.array([(equipment, label) in SOURCES_OF or _one_by_one(equipment)[label] for label in range(256)])
+
+
 def _epoch_ns(definitions: Definitions, axis: Axis) -> int:
     """How far apart the words of one epoch may be: less than half the time to the next epoch."""
     definition = definitions.labels.get(axis.coarse)
@@ -199,7 +205,7 @@ class Aircraft:
     ) -> None:
         """Take one decoded block of a channel (n,): raw words, their values, and when each was true (i8, ns)."""
         equipment = definitions.equipment_id & 0xFF
-        used = self._of_one_source(definitions, time_ns, words, values)
+        used = self._of_one_source(definitions, time_ns, words, values) & _used(equipment)[values.label]
         time_ns, words = time_ns[used], words[used]
         values = Values429(values.label[used], values.value[used], values.status[used])
         for k in np.flatnonzero(_one_by_one(equipment)[values.label]).tolist():
@@ -209,9 +215,9 @@ class Aircraft:
                 self._join(axis, equipment, half, join_rule, _epoch_ns(definitions, axis))
             else:
                 self.utc.feed(int(time_ns[k]), int(words[k]), values, k, definitions)
-        for label in np.flatnonzero(np.bincount(values.label, minlength=256)).tolist():
-            for source in SOURCES_OF.get((equipment, label), ()):
-                at = values.label == label
+        by_label = np.argsort(values.label, kind="stable")
+        for at in np.split(by_label, np.flatnonzero(np.diff(values.label[by_label])) + 1) if len(words) else ():
+            for source in SOURCES_OF.get((equipment, int(values.label[at[0]])), ()):
                 self._take(source, definitions, time_ns[at], words[at], values.value[at], values.status[at])
 
     def doubts(self) -> dict[str, str]:
