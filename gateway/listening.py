@@ -136,7 +136,7 @@ class Listener:
                 if here != self._users.get(what.role, (None, 0))[0]:
                     continue
                 if isinstance(what, Channel708):
-                    if (radials.link, radials.channel) == (link, what) and not self.hearing.is_quiet(RADAR):
+                    if radials.link is link and radials.channel is what and not self.hearing.is_quiet(RADAR):
                         ways.kind[number, channel] = RADIALS
                 elif not what.is_panel and not self.hearing.is_quiet(f"{name}/{channel}"):
                     ways.kind[number, channel] = WORDS
