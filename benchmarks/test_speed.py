@@ -130,14 +130,29 @@ def grid() -> Grid:
 
 @pytest.mark.benchmark(group="terrain thread of one scan, fan of seven")
 def test_terrain_thread(benchmark: BenchmarkFixture, grid: Grid, pointing: Pointing) -> None:
-    states, _ = benchmark(lambda: predict(grid, pointing, BINS, RANGE_NM * NM_M / BINS, Beam()))
-    assert states.shape == (RADIALS, BINS)
+    assert thread(grid, pointing, Beam()).shape == (RADIALS, BINS)  # compiles, or the first round is taken for long
+    benchmark(lambda: thread(grid, pointing, Beam()))
 
 
 @pytest.mark.benchmark(group="terrain thread of one scan, fan of seven")
 def test_the_same_number_of_bilinear_looks(benchmark: BenchmarkFixture, grid: Grid) -> None:
-    lat = np.sort(RNG.uniform(44.1, 44.6, 7 * RADIALS * BINS))  # neighbours lie close, as on a radial
-    assert benchmark(lambda: _look(grid, lat, -71.7)) > 0
+    lat = latitudes(7 * RADIALS * BINS)
+    assert _look(grid, lat, -71.7) > 0
+    benchmark(lambda: _look(grid, lat, -71.7))
+
+
+@pytest.mark.benchmark(group="terrain thread of one scan, boresight alone")
+def test_terrain_thread_of_the_boresight(benchmark: BenchmarkFixture, grid: Grid, pointing: Pointing) -> None:
+    beam = Beam(azimuth_fan=1)
+    assert thread(grid, pointing, beam).shape == (RADIALS, BINS)
+    benchmark(lambda: thread(grid, pointing, beam))
+
+
+@pytest.mark.benchmark(group="terrain thread of one scan, boresight alone")
+def test_one_bilinear_look_a_bin(benchmark: BenchmarkFixture, grid: Grid) -> None:
+    lat = latitudes(RADIALS * BINS)
+    assert _look(grid, lat, -71.7) > 0
+    benchmark(lambda: _look(grid, lat, -71.7))
 
 
 @pytest.mark.benchmark(group="radar thread of one scan")
@@ -147,9 +162,20 @@ def test_radar_thread(benchmark: BenchmarkFixture) -> None:
 
 
 @pytest.mark.benchmark(group="radar thread of one scan")
-def test_copy_of_the_bins(benchmark: BenchmarkFixture) -> None:
+def test_sum_of_the_bins(benchmark: BenchmarkFixture) -> None:
     bins = RNG.integers(0, 5, (RADIALS, BINS), np.uint8)
-    assert benchmark(bins.copy).shape == bins.shape
+    assert _sum(bins) == bins.sum()
+    benchmark(lambda: _sum(bins))
+
+
+def thread(grid: Grid, pointing: Pointing, beam: Beam) -> NDArray[np.int8]:
+    states, _ = predict(grid, pointing, BINS, RANGE_NM * NM_M / BINS, beam)
+    return states
+
+
+def latitudes(count: int) -> NDArray[np.float64]:
+    """In order, so that neighbours lie close, as on a radial."""
+    return np.sort(RNG.uniform(44.1, 44.6, count))
 
 
 def _pieces(stream: bytes) -> list[bytes]:
@@ -171,4 +197,13 @@ def _look(grid: Grid, lat: NDArray[np.float64], lon: float) -> float:
     total = 0.0
     for k in range(lat.size):
         total += sample(grid, lat[k], lon)
+    return total
+
+
+@njit(cache=True)
+def _sum(bins: NDArray[np.uint8]) -> int:
+    total = 0
+    for i in range(bins.shape[0]):
+        for j in range(bins.shape[1]):
+            total += bins[i, j]
     return total

@@ -72,7 +72,7 @@ def ray(latitude_deg: float, longitude_deg: float, height_m: float, azimuth_rad:
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def along(r: Ray, s: float) -> tuple[float, float]:
     """Latitude and longitude in degrees at the horizontal distance s in metres."""
     return (

@@ -13,9 +13,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from monitor.geodesy import along, curvature_radii, ray
-from monitor.shade import walk
-from monitor.terrain import Grid, sample
+from monitor.geodesy import Ray, along, curvature_radii, ray
+from monitor.shade import DEM_INITIAL, walk
+from monitor.terrain import Grid, blend, locate, sample
+
+SETTLED = 0.1  # of a bin: how far a bin's ground may move it and its place still counts as found
+LEVELS = (16, 4, 1)  # bins whose ground is looked up at once: every 16th, every fourth, every one
+MOST_LOOKS = 40  # half of them halve a range setting to less than a centimetre
 
 
 class Beam(NamedTuple):
@@ -54,23 +58,20 @@ def predict(
 def _predict(  # type: ignore[no-untyped-def] # typed by predict
     grid, latitude_deg, longitude_deg, height_m, azimuth_rad, elevation_rad, ranges_m, half_beam_rad, fan_rad, k
 ):
-    states = np.empty((azimuth_rad.size, ranges_m.size), np.int8)
+    states = np.full((azimuth_rad.size, ranges_m.size), DEM_INITIAL, np.int8)
     void = np.zeros(azimuth_rad.size, np.bool_)
     delta = np.empty(ranges_m.size)
-    one = np.empty(ranges_m.size, np.int8)
     for i in range(azimuth_rad.size):
         dmin = math.tan(elevation_rad[i] - half_beam_rad)
         dmax = math.tan(elevation_rad[i] + half_beam_rad)
         for f in range(fan_rad.size):
             azimuth = azimuth_rad[i] + fan_rad[f]
             void[i] |= tangents(grid, latitude_deg[i], longitude_deg[i], height_m[i], azimuth, ranges_m, k, delta)
-            walk(delta, dmin, dmax, one)
-            for j in range(one.size):
-                states[i, j] = one[j] if f == 0 else max(states[i, j], one[j])
+            walk(delta, dmin, dmax, states[i])
     return states, void
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def tangents(
     grid: Grid,
     latitude_deg: float,
@@ -86,27 +87,106 @@ def tangents(
     Bins nearer than the ground below get -infinity, those from the first missing post on NaN. In the triangle of
     antenna, ground and the Earth's centre the slant range squared is the height difference squared plus the square of
     the chord at the mean height, whatever the curvature, so only the elevation sees the drop.
+
+    The distance of a bin's ground depends on its height, and the height on the distance. To wait for the ground of the
+    bin before takes a processor several times as long as to look, so guesses come from every fourth bin instead, and
+    theirs from every sixteenth. A bin that its own ground then moves by more than `SETTLED` is settled alone, so that
+    every point lies within a tenth of a bin of the stored ground.
     """
     meridian, prime = curvature_radii(math.radians(latitude_deg))
-    twice_radius = 2 * k * math.sqrt(meridian * prime)
-    ground = sample(grid, latitude_deg, longitude_deg)
-    if math.isnan(ground):
-        ground = height_m
-    r = ray(latitude_deg, longitude_deg, (height_m + ground) / 2, azimuth_rad)
+    drop = 1 / (2 * k * math.sqrt(meridian * prime))
+    below = sample(grid, latitude_deg, longitude_deg)
+    if math.isnan(below):
+        below = height_m
+    track = _in_posts(grid, ray(latitude_deg, longitude_deg, (height_m + below) / 2, azimuth_rad))
+    ground, guessed = _look(grid.height_m, track, height_m, below, ranges_m)
+    tolerance = SETTLED * (ranges_m[1] - ranges_m[0]) if ranges_m.size > 1 else 0.0
     for j in range(ranges_m.size):
-        for _ in range(2):  # the last bin's ground is a guess good enough for two corrections
-            s2 = ranges_m[j] ** 2 - (height_m - ground) ** 2
-            if s2 <= 0:
-                break
-            lat, lon = along(r, math.sqrt(s2))
-            found = sample(grid, lat, lon)
-            if math.isnan(found):
+        depth = height_m - ground[j]
+        s = _distance(ranges_m[j], depth)
+        settled = (abs(s - guessed[j]) <= tolerance) & (s > 0)
+        delta[j] = _lowered(-depth / s, s * drop) if settled else math.nan
+    first = np.searchsorted(ranges_m, abs(height_m - below), "right")
+    delta[:first] = -math.inf
+    for j in range(first, ranges_m.size):
+        if math.isnan(delta[j]):
+            for guess in (ground[j], ground[j - 1] if j else below):  # the second where the first leads over a void
+                ground[j] = _settle(grid.height_m, track, height_m, guess, ranges_m[j], tolerance)
+                if not math.isnan(ground[j]):
+                    break
+            if math.isnan(ground[j]):
                 delta[j:] = math.nan
                 return True
-            ground = found
-        s2 = ranges_m[j] ** 2 - (height_m - ground) ** 2
-        if s2 <= 0:
-            delta[j] = -math.inf
-        else:
-            delta[j] = -(height_m - ground) / math.sqrt(s2) - math.sqrt(s2) / twice_radius
+            depth = height_m - ground[j]
+            s = _distance(ranges_m[j], depth)
+            delta[j] = _lowered(-depth / s, s * drop)
     return False
+
+
+@njit(cache=True, error_model="numpy")
+def _look(post_m, track, height_m, below_m, ranges_m):  # type: ignore[no-untyped-def] # typed by tangents
+    """Ground for each bin, and the distance at which it was looked up.
+
+    Several plain loops, because each goes four bins at a time where one loop over all of it would go bin by bin.
+    """
+    n = ranges_m.size
+    places, posts = np.empty((6, n)), np.empty((2, n), np.uint32)
+    ground, guess, range_m = places[0], places[1], places[2]
+    distance, south, east = places[3], places[4], places[5]
+    row, column = posts[0], posts[1]
+    ground[0] = below_m
+    known = 1
+    for step in LEVELS:
+        size = (n - 1) // step + 1
+        for j in range(size):
+            guess[j] = ground[min((j + 2) // 4, known - 1)]  # the nearest of the level before
+        for j in range(size):
+            range_m[j] = ranges_m[j * step]
+        for j in range(size):
+            distance[j] = _distance(range_m[j], height_m - guess[j])
+        for j in range(size):
+            r, c = along(track, distance[j])
+            row[j], column[j], south[j], east[j] = locate(post_m, r, c)
+        for j in range(size):
+            ground[j] = blend(post_m, row[j], column[j], south[j], east[j])
+        known = size
+    return ground, distance
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _settle(post_m, track, height_m, ground_m, range_m, tolerance):  # type: ignore[no-untyped-def] # typed by tangents
+    """The ground at one slant range, by corrections and halvings in turn: looking steeply down the former diverge."""
+    near, far = 0.0, range_m
+    s = _distance(range_m, height_m - ground_m)
+    for look in range(MOST_LOOKS):
+        r, c = along(track, s)
+        ground_m = blend(post_m, *locate(post_m, r, c))
+        found = _distance(range_m, height_m - ground_m)
+        if not abs(found - s) > tolerance:
+            break
+        near, far = (s, far) if found > s else (near, s)
+        s = found if near < found < far and look % 2 == 0 else (near + far) / 2
+    return ground_m
+
+
+@njit(cache=True)
+def _distance(range_m: float, depth_m: float) -> float:
+    """The horizontal side of the triangle of a slant range and a height difference; 0 if there is none."""
+    s2 = range_m**2 - depth_m**2
+    return math.sqrt(s2 if s2 > 0 else 0.0)
+
+
+@njit(cache=True)
+def _lowered(tangent: float, drop_rad: float) -> float:
+    """The tangent of an elevation less the small angle by which the Earth's curvature turns the chord."""
+    return tangent - drop_rad * (1 + tangent**2)
+
+
+@njit(cache=True)
+def _in_posts(grid: Grid, r: Ray) -> Ray:
+    """The ray in rows and columns of the grid where it has degrees of latitude and longitude."""
+    south, east = -1 / grid.row_deg, 1 / grid.column_deg
+    return Ray(
+        (r.lat0 - grid.north_deg) * south, r.lat1 * south, r.lat2 * south, r.lat3 * south,
+        (r.lon0 - grid.west_deg) * east, r.lon1 * east, r.lon2 * east, r.lon3 * east,
+    )  # fmt: skip

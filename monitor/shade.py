@@ -102,17 +102,18 @@ def unmatched_share(
 def _radar_states(bins: NDArray[np.uint8]) -> NDArray[np.int8]:
     out = np.empty(bins.shape, np.int8)
     for i in range(bins.shape[0]):
-        seen = False
-        for j in range(bins.shape[1]):
-            lit = bins[i, j] > 0
-            seen |= lit
-            out[i, j] = RADAR_LIT if lit else (RADAR_SHADOW if seen else RADAR_INITIAL)
+        for j in range(bins.shape[1]):  # with no state to carry, many bins at a time
+            out[i, j] = RADAR_LIT if bins[i, j] > 0 else RADAR_SHADOW
+        first = 0
+        while first < bins.shape[1] and bins[i, first] == 0:
+            out[i, first] = RADAR_INITIAL
+            first += 1
     return out
 
 
 @njit(cache=True)
 def _dem_states(delta: NDArray[np.float64], dmin: NDArray[np.float64], dmax: NDArray[np.float64]) -> NDArray[np.int8]:
-    out = np.empty(delta.shape, np.int8)
+    out = np.full(delta.shape, DEM_INITIAL, np.int8)
     for i in range(delta.shape[0]):
         walk(delta[i], dmin[i], dmax[i], out[i])
     return out
@@ -120,27 +121,28 @@ def _dem_states(delta: NDArray[np.float64], dmin: NDArray[np.float64], dmax: NDA
 
 @njit(cache=True)
 def walk(delta: NDArray[np.float64], dmin: float, dmax: float, out: NDArray[np.int8]) -> None:
-    """Table 1 along one radial, into `out`; the peak is +infinity once something above the beam hides the rest."""
-    last = delta.size - 1
-    state = DEM_INITIAL
-    peak = np.inf
-    for j in range(delta.size):
+    """Table 1 along one radial; a bin of `out` is raised to its state, so that the rays of a fan join in one array.
+
+    The stored peak is the highest tangent so far, which hides what is not above it. One above the beam, which nothing
+    in the beam exceeds, hides the rest. A bin as high as a lit one before it is lit: their edge is a plateau.
+    """
+    n = delta.size
+    top = dmin
+    lit = False
+    dark = DEM_INITIAL
+    for j in range(n):
         d = delta[j]
-        above_next = j < last and d > delta[j + 1]  # condition B
-        next_over = j < last and delta[j + 1] > dmax  # condition C
-        hidden = state == DEM_PEAK or (state == DEM_SHADOW and d <= peak)
-        if state == DEM_INITIAL and not d > dmin:  # not condition A
-            out[j] = DEM_INITIAL
-            continue
-        if hidden:
-            state = DEM_SHADOW
-        elif d > dmax:
-            state, peak = DEM_SHADOW, np.inf
-        elif above_next or next_over:
-            state, peak = DEM_PEAK, np.inf if next_over else d
-        else:
-            state = DEM_LIT
-        out[j] = state
+        if d > top:
+            top = d
+            lit = d <= dmax
+            dark = DEM_SHADOW
+        elif d < top:
+            lit = False
+        state = dark
+        if lit:
+            following = delta[j + 1] if j + 1 < n else d
+            state = DEM_PEAK if following < d or following > dmax else DEM_LIT
+        out[j] = max(out[j], state)
 
 
 @njit(cache=True)

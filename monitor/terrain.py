@@ -31,7 +31,10 @@ class TerrainError(ValueError):
 
 
 class Grid(NamedTuple):
-    """Posts in degrees north and east; `height_m` is float32 (rows southward, columns eastward), NaN where void."""
+    """Posts in degrees north and east; `height_m` is float32 (rows southward, columns eastward), NaN where void.
+
+    There are at least two rows and two columns, or nothing lies between posts.
+    """
 
     height_m: NDArray[np.float32]
     north_deg: float
@@ -94,6 +97,8 @@ def _read(path: Path) -> Grid:
 def _grid(source: rasterio.DatasetReader) -> Grid:
     if source.count != 1:
         raise TerrainError(f"{source.name} has {source.count} bands: a terrain file has one, of heights in metres")
+    if min(source.shape) < 2:
+        raise TerrainError(f"{source.name} has {source.height} x {source.width} posts: 2 x 2 are the least")
     height_m = source.read(1, masked=True).astype(np.float32).filled(np.nan)
     if np.any((height_m < LOWEST_M) | (height_m > HIGHEST_M)):
         extremes = f"{np.nanmin(height_m):.0f} to {np.nanmax(height_m):.0f}"
@@ -134,19 +139,40 @@ def _offset(tile: Grid, first: Grid, path: Path) -> tuple[int, int]:
     return round(row), round(column)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def sample(grid: Grid, latitude_deg: float, longitude_deg: float) -> float:
     """Bilinear height in metres; NaN where one of the four posts is void or the place is outside."""
     row = (grid.north_deg - latitude_deg) / grid.row_deg
     column = (longitude_deg - grid.west_deg) / grid.column_deg
-    rows, columns = grid.height_m.shape
-    if not (0.0 <= row <= rows - 1 and 0.0 <= column <= columns - 1):
-        return math.nan
-    i, j = min(int(row), rows - 2), min(int(column), columns - 2)
-    u, v = row - i, column - j
-    upper = grid.height_m[i, j] * (1 - v) + grid.height_m[i, j + 1] * v
-    lower = grid.height_m[i + 1, j] * (1 - v) + grid.height_m[i + 1, j + 1] * v
-    return float(upper * (1 - u) + lower * u)
+    return blend(grid.height_m, *locate(grid.height_m, row, column))
+
+
+@njit(cache=True)
+def locate(height_m: NDArray[np.float32], row: float, column: float) -> tuple[np.uint32, np.uint32, float, float]:
+    """The post north-west of a place, and how far south and east of it the place lies, in posts; NaN outside.
+
+    Without a branch, or a loop over places could not go four at a time. Any number, NaN too, gives a post that exists.
+    """
+    rows, columns = height_m.shape
+    i, j = np.int32(_within(row, rows - 2.0)), np.int32(_within(column, columns - 2.0))
+    inside = (row >= 0) & (row <= rows - 1) & (column >= 0) & (column <= columns - 1)
+    return np.uint32(i), np.uint32(j), row - i if inside else math.nan, column - j
+
+
+@njit(cache=True)
+def _within(x: float, last: float) -> float:
+    x = x if x > 0.0 else 0.0  # NaN becomes 0, where max would hand it on
+    return x if x < last else last
+
+
+@njit(cache=True)
+def blend(height_m: NDArray[np.float32], i: np.uint32, j: np.uint32, south: float, east: float) -> float:
+    """Bilinear height between post (i, j) and its neighbours to the south and east, in double precision."""
+    k, m = i + np.uint32(1), j + np.uint32(1)
+    upper, lower = np.float64(height_m[i, j]), np.float64(height_m[k, j])
+    upper += (height_m[i, m] - upper) * east
+    lower += (height_m[k, m] - lower) * east
+    return float(upper + (lower - upper) * south)
 
 
 @njit(cache=True)

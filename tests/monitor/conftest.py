@@ -32,3 +32,8 @@ def sao_tome_path() -> Path:
 @pytest.fixture(scope="session")
 def white_mountains(white_mountains_path: Path) -> Terrain:
     return open_terrain(white_mountains_path)
+
+
+@pytest.fixture(scope="session")
+def sierra(sierra_path: Path) -> Terrain:
+    return open_terrain(sierra_path)

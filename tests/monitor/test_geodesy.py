@@ -39,6 +39,15 @@ def test_a_ray_follows_the_geodesic_well_within_a_tenth_of_a_range_bin(
             assert geod.inv(lon, lat, true_lon, true_lat)[2] < share_of_a_bin * reach_m / 512
 
 
+def test_a_ray_goes_on_across_the_date_line() -> None:
+    """Longitudes beyond 180 degrees are those of the terrain's columns there."""
+    for azimuth in AZIMUTHS:
+        lat, lon = along(ray(-17.0, 179.95, 0.0, np.radians(azimuth)), 18_520.0)
+        assert abs(lon - 179.95) < 0.18
+        true_lon, true_lat, _ = Geod(ellps="WGS84").fwd(179.95, -17.0, azimuth, 18_520.0)
+        assert Geod(ellps="WGS84").inv(lon, lat, true_lon, true_lat)[2] < 0.01
+
+
 @pytest.mark.parametrize("azimuth", AZIMUTHS[::3])
 def test_distances_at_height_are_measured_at_that_height(azimuth: int) -> None:
     """At 9000 m a horizontal 20 NM spans 52 m less of the ellipsoid: the same geodesic on an ellipsoid as much larger.

@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from pyproj import Geod, Transformer
 
+from monitor.geodesy import along, curvature_radii, ray
 from monitor.prediction import Beam, Pointing, predict, tangents
-from monitor.shade import shadows
+from monitor.shade import dem_states, shadows
 from monitor.terrain import Grid, Terrain
 from tests.monitor.ground import COLUMNS, LATITUDE, LONGITUDE, distance_m, looking_north, mesa, northward, plain, post_m
 
@@ -62,6 +63,93 @@ def test_real_ground_is_met_to_a_tenth_of_a_range_bin(
             assert np.abs(ground[near] - r * np.exp(1j * np.arctan(tangent))).min() < BIN_M / 10
             tested += 1
     assert tested > 300
+
+
+@pytest.mark.parametrize("azimuth", [20, 197.6, 290])
+@pytest.mark.parametrize(
+    ("terrain", "place", "bin_m"),
+    [
+        ("white_mountains", (44.37514, -71.71874, 761.0), BIN_M),
+        ("white_mountains", (44.3, -71.45, 3500.0), BIN_M),
+        ("white_mountains", (44.3, -71.5, 9000.0), BIN_M),
+        ("sierra", (37.43, -119.26, 2800.0), BIN_M / 2),
+        ("sierra", (37.43, -119.26, 6000.0), BIN_M / 2),
+    ],
+)
+def test_every_bin_lies_on_the_ground_however_steeply_the_beam_looks(
+    request: pytest.FixtureRequest, terrain: str, place: tuple[float, float, float], bin_m: float, azimuth: float
+) -> None:
+    """Not only where the slant range has one solution: each bin has its range and lies on the walked ground."""
+    stored: Terrain = request.getfixturevalue(terrain)
+    below_m = place[2] - float(stored.elevation(*place[:2]))
+    bin_ranges = (np.arange(512, dtype=np.float64) + 0.5) * bin_m
+    ranges, elevation = dense_walk(stored, place, azimuth)
+    delta = np.empty(512)
+    tangents(stored.grid, *place, radians(azimuth), bin_ranges, 1.0, delta)
+    np.testing.assert_array_equal(np.isneginf(delta), bin_ranges <= below_m)
+    within = (bin_ranges > below_m) & (bin_ranges < np.nanmax(ranges) - bin_m) & ~np.isnan(delta)
+    assert np.count_nonzero(within) > 150
+    ground = ranges * np.exp(1j * elevation)
+    points = bin_ranges[within] * np.exp(1j * np.arctan(delta[within]))
+    misses = [np.nanmin(np.abs(ground - point)) for point in points]
+    assert max(misses) < bin_m / 10
+
+
+def two_corrections(
+    terrain: Terrain, pointing: Pointing, bin_m: float, k: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Tangents (n, 512) of radials, bin after bin, each corrected twice from the ground of the one before."""
+    rays = [
+        ray(latitude, longitude, (height_m + float(terrain.elevation(latitude, longitude))) / 2, azimuth)
+        for latitude, longitude, height_m, azimuth in zip(*pointing[:4], strict=True)
+    ]
+    meridian, prime = curvature_radii(radians(float(pointing.latitude_deg[0])))
+    ground = terrain.elevation(*pointing[:2])
+    delta = np.empty((len(rays), 512))
+    for j in range(512):
+        r2 = ((j + 0.5) * bin_m) ** 2
+        for _ in range(2):
+            s = np.sqrt(r2 - (pointing.height_m - ground) ** 2)
+            places = np.array([along(*each) for each in zip(rays, s, strict=True)])
+            found = terrain.elevation(*places.T)
+            ground = np.where(s > 0, found, ground)
+        s = np.sqrt(r2 - (pointing.height_m - ground) ** 2)
+        delta[:, j] = np.where(s > 0, -(pointing.height_m - ground) / s - s / (2 * k * np.sqrt(meridian * prime)), -inf)
+    return delta, np.isnan(ground)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value encountered in sqrt")
+@pytest.mark.parametrize(
+    ("terrain", "place", "bin_m"),
+    [("white_mountains", (44.37514, -71.71874, 761.0), BIN_M), ("sierra", (37.43, -119.26, 2500.0), BIN_M / 2)],
+)
+def test_states_are_those_of_bins_corrected_twice_one_after_the_other_but_for_one_in_a_thousand(
+    request: pytest.FixtureRequest, terrain: str, place: tuple[float, float, float], bin_m: float
+) -> None:
+    """What a tenth of a bin decides: a bin at an edge, or whether a lit one is a peak."""
+    stored: Terrain = request.getfixturevalue(terrain)
+    n = 60
+    latitude, longitude, height_m = np.repeat(place, n).reshape(3, n)
+    pointing = Pointing(latitude, longitude, height_m, np.radians(np.arange(n) * 6.0), np.radians(np.full(n, -2.0)))
+    states, void = predict(stored.grid, pointing, 512, bin_m, Beam(azimuth_fan=1))
+    delta, lost = two_corrections(stored, pointing, bin_m, 4 / 3)
+    np.testing.assert_array_equal(void, lost)
+    expected = dem_states(delta[~lost], tan(radians(-3.75)), tan(radians(-0.25)))
+    assert np.count_nonzero(expected > 0) > 2000
+    assert np.count_nonzero(states[~lost] != expected) < expected.size / 1000
+
+
+def test_a_bin_is_found_though_its_first_guess_lies_beyond_the_last_post() -> None:
+    """From 500 m, 100 m over a plateau, the ground of 10 km is looked for at 9999.5 m; on the plain it is at 9987.5."""
+    edge_m = post_m(323)
+    grid = northward(lambda latitude: np.where(distance_m(latitude) < 2000, 400.0, 0.0), rows=10 + 324)
+    guess_m, ground_m = edge_m + 2, edge_m - 10
+    range_m = float(np.hypot(guess_m, 100))
+    assert np.sqrt(range_m**2 - 500**2) == pytest.approx(ground_m, abs=1)
+    delta = np.empty(1)
+    assert not tangents(grid, LATITUDE, LONGITUDE, 500.0, 0.0, np.array([range_m]), inf, delta)
+    assert delta[0] == pytest.approx(-500 / np.sqrt(range_m**2 - 500**2), rel=1e-12)
+    assert tangents(grid, LATITUDE, LONGITUDE, 500.0, 0.0, np.array([range_m + 15]), inf, delta)
 
 
 def test_the_drop_at_10_nautical_miles_is_20_metres_with_standard_refraction() -> None:

@@ -113,9 +113,11 @@ def test_outside_the_posts_is_nan() -> None:
     terrain = grid([[1, 2], [3, 4]])
     tiny = 1e-9
     inside = terrain.elevation([45, 45, 44.75, 44.75], [7, 7.25, 7, 7.25])
-    outside = terrain.elevation([45 + tiny, 45, 44.75 - tiny, 44.75, np.nan], [7, 7.25 + tiny, 7, 7 - tiny, 7])
+    outside = terrain.elevation([45 + tiny, 45, 44.75 - tiny, 44.75], [7, 7.25 + tiny, 7, 7 - tiny])
+    no_place = terrain.elevation(*np.meshgrid([44.9, np.nan, np.inf, -1e300], [7.1, np.nan, -np.inf, 1e300]))
     assert inside.tolist() == [1, 2, 3, 4]
     assert np.isnan(outside).all()
+    assert np.count_nonzero(~np.isnan(no_place)) == 1
 
 
 @pytest.mark.parametrize("south_first", [False, True])
@@ -197,6 +199,13 @@ def test_a_picture_is_no_terrain(tmp_path: Path) -> None:
     ) as file:  # fmt: skip
         file.write(np.zeros((3, 2, 2), np.uint8))
     with pytest.raises(TerrainError, match="has 3 bands"):
+        open_terrain(path)
+
+
+@pytest.mark.parametrize("shape", [(1, 5), (5, 1)])
+def test_a_line_of_posts_is_no_terrain(tmp_path: Path, shape: tuple[int, int]) -> None:
+    path = write(tmp_path / "line.tif", np.zeros(shape, np.int16), north_up(7, 45, 0.25))
+    with pytest.raises(TerrainError, match=f"has {shape[0]} x {shape[1]} posts: 2 x 2 are the least"):
         open_terrain(path)
 
 
