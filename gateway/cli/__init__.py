@@ -7,6 +7,7 @@ from collections.abc import Callable
 import typer
 
 from gateway import kernel_cache
+from gateway.cli.cut import cut
 from gateway.cli.decode import decode_429, decode_708
 from gateway.cli.demo import demo
 from gateway.cli.devices import devices
@@ -14,10 +15,13 @@ from gateway.cli.doctor import doctor
 from gateway.cli.dump import dump
 from gateway.cli.info import info
 from gateway.cli.labels import labels
+from gateway.cli.merge import merge
+from gateway.cli.recover import recover
 from gateway.cli.replay import replay
 from gateway.cli.run import run
 from gateway.cli.simulate import simulate
 from gateway.cli.thresholds import thresholds
+from gateway.cli.verify import verify
 from gateway.errors import GatewayError
 
 app = typer.Typer(
@@ -26,7 +30,8 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for verb in (demo, run, simulate, replay, dump, info, labels, thresholds, devices, doctor):
+RECORDINGS = (replay, dump, info, verify, recover, cut, merge)
+for verb in (demo, run, simulate, *RECORDINGS, labels, thresholds, devices, doctor):
     app.command()(verb)
 
 decode = typer.Typer(help="Explain one bus word, field by field.", no_args_is_help=True)

@@ -58,12 +58,13 @@ class Keeper:
         self._rotate_ns = 0  # the next time at which rotation may be tried
         self._sync_error: OSError | None = None
         self._not_rotated = ""  # why, told already
+        self._recorder: Recorder | None = self._open()
         try:
             self._check_room(0)
         except OSError as error:
+            self._syncer.close(self._recorder, whole=False)
             mend = "make room, name another directory, or lower reserve_mib under [recording]"
             raise GatewayError(f"cannot record to {config.directory}: {error.strerror}; {mend}") from error
-        self._recorder: Recorder | None = self._open()
 
     def begin(self) -> None:
         """Start to synchronise."""
@@ -94,6 +95,7 @@ class Keeper:
             return ""
         self._look_ns = now_ns + LOOK_NS
         try:
+            self._config.directory.mkdir(parents=True, exist_ok=True)
             self._check_room(MARGIN_BYTES)
             self._recorder = self._open()
         except (OSError, GatewayError):
@@ -138,7 +140,6 @@ class Keeper:
 
     def _check_room(self, margin: int) -> None:
         directory, reserve = self._config.directory, self._config.reserve_mib * MIB
-        directory.mkdir(parents=True, exist_ok=True)
         free = shutil.disk_usage(directory).free
         if free < reserve + margin:
             raise OSError(errno.ENOSPC, f"{free / MIB:.1f} MiB free, less than the reserve of {reserve / MIB:g} MiB")

@@ -78,7 +78,7 @@ def metadata_of(path: Path) -> dict[str, str]:
         reader = FileReader(path, window, Findings())
         next(reader.records(), None)
     if not reader.metadata and opening != OPENING:
-        if len(opening) < len(OPENING):
+        if window.size < len(OPENING):
             raise GatewayError(f"{path} is not a shadebus recording: it ends before its first record")
         if opening.startswith(MAGIC):
             raise GatewayError(f"{path} is an MCAP file, but not a shadebus recording")

@@ -17,7 +17,7 @@ from gateway.config import RackConfig
 from gateway.errors import GatewayError
 from gateway.events import Event
 from gateway.metadata import build_monitor
-from gateway.recording import Recorder
+from gateway.recording import Recorder, keeper
 from gateway.records import Raw, Record, Status
 from gateway.service import Service
 from monitor.integrity import Comparison, Verdict
@@ -66,7 +66,7 @@ def recorder_that_raises(monkeypatch: pytest.MonkeyPatch, error: Exception, afte
                 raise error
             super().append(records)
 
-    monkeypatch.setattr(service_module, "Recorder", Failing)
+    monkeypatch.setattr(keeper, "Recorder", Failing)
 
 
 def test_a_full_disk_stops_the_recording_loudly_and_the_decoding_goes_on(
@@ -78,9 +78,10 @@ def test_a_full_disk_stops_the_recording_loudly_and_the_decoding_goes_on(
         line.write(stream)
         wait_until(lambda: sum(event.type == "scan" for event in gateway.events) == 2, "two scans")
         wait_until(lambda: gateway.states("recording") == ["FAILED"], "the failure is told")
-    assert len(gateway.service.failures) == 1
-    assert "recording stopped" in gateway.service.failures[0]
-    assert "No space left on device; make room" in gateway.service.failures[0]
+    stopped, lost = gateway.service.failures
+    assert "recording stopped" in stopped
+    assert "No space left on device; make room" in stopped
+    assert "records were not recorded" in lost
     assert not gateway.service.broken.is_set()
 
 
@@ -303,4 +304,4 @@ def test_a_driver_that_never_comes_back_is_left_behind_and_told(
         wait_until(entered.is_set, "opening")
     release.set()
     assert gateway.service.failures == ["adapter bridge: its driver does not come back; it is left behind"]
-    assert [record.state for record in records(path_of(gateway)) if isinstance(record, Status)] == ["OPENING"]
+    assert [record.state for record in records(path_of(gateway)) if isinstance(record, Status)] == ["OPENING", "CLOSED"]
