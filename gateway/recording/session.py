@@ -60,12 +60,7 @@ class Recording:
 
 
 def read_file(path: Path, found: Findings) -> Iterator[Record]:
-    """The records of one file; a file that is no recording at all is a damaged place among others."""
-    try:
-        metadata_of(path)
-    except GatewayError as error:
-        found.add(Damage(path, 0, path.stat().st_size if path.exists() else 0, str(error)))
-        return
+    """The records of one file, which need not even be a recording: then all of it is damaged, or torn."""
     with Window(path) as window:
         yield from FileReader(path, window, found).records()
 

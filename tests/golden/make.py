@@ -71,7 +71,9 @@ def main() -> None:
         },
         "golden",
     )
-    recorder = Recorder(HERE / f"{sys.argv[1]}.mcap", {**describe(config, build_monitor(config)), "host": "golden"})
+    recorder = Recorder(
+        HERE / f"{sys.argv[1]}.mcap", {**describe(config, build_monitor(config)), "host": "golden", "boot": "golden"}
+    )
     for record in records():
         recorder.append([record])
     recorder.close()
