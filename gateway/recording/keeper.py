@@ -78,7 +78,7 @@ class Keeper:
             return
         whole = True
         try:
-            self._look(recorder, now_ns)
+            self._look(recorder)
             whole = False
             recorder.append(records)
         except OSError as error:
@@ -127,10 +127,11 @@ class Keeper:
         self._syncer.watch(recorder)
         return recorder
 
-    def _look(self, recorder: Recorder, now_ns: int) -> None:
+    def _look(self, recorder: Recorder) -> None:
         """Once a second, whether the disk is well and the file is there. Raises OSError that says what is wrong."""
         if self._sync_error:
             raise self._sync_error
+        now_ns = time.monotonic_ns()
         if now_ns >= self._look_ns:
             self._look_ns = now_ns + LOOK_NS
             if not recorder.there:

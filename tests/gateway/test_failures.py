@@ -1,6 +1,7 @@
 """Nothing in the gateway can die silently: whatever breaks is in `failures`, and what can go on goes on."""
 
 import errno
+import json
 import os
 import signal
 import subprocess
@@ -17,7 +18,8 @@ from gateway.config import RackConfig
 from gateway.errors import GatewayError
 from gateway.events import Event
 from gateway.metadata import build_monitor
-from gateway.recording import Recorder, keeper
+from gateway.recording import Recorder, Recording, keeper
+from gateway.recording.verify import verify
 from gateway.records import Raw, Record, Status
 from gateway.service import Service
 from monitor.integrity import Comparison, Verdict
@@ -25,7 +27,7 @@ from monitor.scans import Scan
 from simulators.outlets import PtyOutlet
 from tests.gateway.conftest import TERRAIN, MakeRack
 from tests.gateway.live import Live, recorded_bytes, records, wait_until
-from tests.gateway.shell import GATEWAY, Running, shadebus
+from tests.gateway.shell import GATEWAY, Running
 
 
 @pytest.fixture
@@ -196,32 +198,31 @@ def test_a_device_that_cannot_be_opened_stops_everything_at_once(make_rack: Make
     assert [thread.name for thread in threading.enumerate() if "bridge" in thread.name] == []
 
 
-def test_a_write_that_really_fails_leaves_a_recording_that_replays_and_a_non_zero_exit(
+def test_writes_that_really_fail_are_told_and_counted_and_recording_goes_on_in_another_file(
     line: PtyOutlet, stream: bytes, tmp_path: Path
 ) -> None:
     limit = 30_000
     source = ("--source", f"serial:{line.path}", "--dem", TERRAIN, "--record", tmp_path)
     with Running(*source, largest_file=limit) as gateway:
         gateway.wait_for("status", state="UP")
-        for _ in range(3):
-            line.write(stream)
+        line.write(stream)
         gateway.wait_for("status", state="FAILED", adapter="recording")
-        gateway.wait_for("integrity", scan=1)
+        gateway.wait_for("status", state="LOST", adapter="recording")
         line.close()
-        gateway.wait_for("status", state="LOST")
+        gateway.wait_for("status", state="LOST", adapter="bridge0")
         gateway.process.send_signal(signal.SIGTERM)
         assert gateway.end() == 1
-        assert "recording stopped" in gateway.errors
-        assert "File too large; make room" in gateway.errors
+        assert "records were not recorded" in gateway.errors
         assert "Traceback" not in gateway.errors
-    (path,) = tmp_path.glob("*.mcap")
-    assert path.stat().st_size <= limit
-    kept = recorded_bytes(path, "bridge0")
-    assert stream.startswith(kept)
-    assert kept
-    again = shadebus("replay", path, "--json")
-    before = [text for text in again.stdout.splitlines() if '"status"' in text]
-    assert gateway.lines[: len(before)] == before
+        told = [event for event in map(json.loads, gateway.lines) if event.get("adapter") == "recording"]
+    assert any("File too large; make room" in event["reason"] for event in told if event["state"] == "FAILED")
+    (first, *_) = sorted(tmp_path.glob("*.mcap"), key=lambda path: len(path.name))
+    recording = Recording(first)
+    assert len(recording.files) > 1
+    assert all(path.stat().st_size <= limit for path in recording.files)
+    lost = [record for record in recording if isinstance(record, Status) and record[2:4] == ("recording", "LOST")]
+    missing = verify(recording).missing
+    assert missing == sum(int(record.reason.split()[0]) for record in lost) > 0
 
 
 def test_a_disk_that_is_full_from_the_start_is_one_line(line: PtyOutlet, tmp_path: Path) -> None:

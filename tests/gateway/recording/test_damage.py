@@ -16,6 +16,7 @@ from gateway.errors import GatewayError
 from gateway.recording import Recorder, Recording
 from gateway.recording import reader as reader_module
 from gateway.recording.layout import MAGIC, Topic, parse_payload
+from gateway.recording.window import Window
 from gateway.records import Raw, Record
 from tests.gateway.made import raw, some_records, tick
 from tests.golden.make import HERE
@@ -185,7 +186,7 @@ def test_megabytes_of_plausible_garbage_cost_work_in_proportion(
         spent[0] += len(data)
         return parse_payload(topic, data)
 
-    class Watched(reader_module.Window):
+    class Watched(Window):
         def get(self, at: int, count: int) -> bytes:
             largest[0] = max(largest[0], len(self.data))
             return super().get(at, count)
