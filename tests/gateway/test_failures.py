@@ -75,6 +75,7 @@ def test_a_full_disk_stops_the_recording_loudly_and_the_decoding_goes_on(
     line: PtyOutlet, make_rack: MakeRack, stream: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recorder_that_raises(monkeypatch, OSError(errno.ENOSPC, "No space left on device"), after=3)
+    monkeypatch.setattr(keeper, "LOOK_NS", 1 << 60)  # and no second attempt
     with Background(make_rack(f"serial:{line.path}")) as gateway:
         wait_until(lambda: "UP" in gateway.states("bridge"), "UP")
         line.write(stream)

@@ -1,10 +1,13 @@
 """A recording holds what was appended, whatever happens to its end."""
 
+import contextlib
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from mcap.reader import make_reader
+from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader, make_reader
 
 from gateway.errors import GatewayError
 from gateway.recording import Recorder, Recording
@@ -73,6 +76,69 @@ def test_any_mcap_tool_opens_a_closed_recording(closed: Path) -> None:
         "/tick",
     }
     assert summary.statistics.message_count == len(messages) == 6
+
+
+def test_the_mcap_library_reads_a_torn_recording_up_to_the_tear(closed: Path, tmp_path: Path) -> None:
+    data = closed.read_bytes()
+    second = data.index(bytes(range(256)))
+    torn = tmp_path / "torn.mcap"
+    for size, whole in ((second + 100, 1), (second + 300, 2), (len(data) - 200, 6)):
+        torn.write_bytes(data[:size])
+        found: list[bytes] = []
+        with torn.open("rb") as file, contextlib.suppress(McapError, struct.error):
+            for _, _, message in NonSeekingReader(file).iter_messages(log_time_order=False):
+                found.append(message.data)
+        assert len(found) >= whole
+        assert len(list(Recording(torn))) >= whole
+
+
+def test_a_closed_recording_has_its_index_on_disk(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.mcap", METADATA)
+    recorder.append([tick(0, 0.0)])
+    recorder.close()
+    data = recorder.path.read_bytes()
+    assert data.endswith(b"\x89MCAP0\r\n") and data.count(b"\x89MCAP0\r\n") == 2
+    assert recorder.size == len(data)
+
+
+def test_nothing_grows_in_memory_with_the_records(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.mcap", METADATA)
+    for k in range(3000):
+        recorder.append([raw(2 * k, 0.0, b"x"), tick(2 * k + 1, 0.0)])
+    held = [thing for thing in vars(recorder._writer).values() if isinstance(thing, list | dict)]
+    assert len(held) > 5 and max(map(len, held)) <= 2, "the MCAP writer keeps nothing but its channels"
+    recorder.abandon()
+
+
+def test_a_record_larger_than_any_may_be_is_refused(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.mcap", METADATA)
+    with pytest.raises(ValueError, match="record 3 of 16777248 bytes is larger"):
+        recorder.append([raw(3, 0.0, bytes(16 << 20))])
+    recorder.abandon()
+
+
+def test_a_directory_stands_for_its_only_session_and_a_list_for_itself(closed: Path, tmp_path: Path) -> None:
+    assert list(Recording(tmp_path)) == some_records()
+    second = Recorder(tmp_path / "other.mcap", METADATA)
+    second.append([tick(0, 0.0)])
+    second.close()
+    with pytest.raises(GatewayError, match=r"a directory with 2 recordings: name one \(closed.mcap, other.mcap\)"):
+        Recording(tmp_path)
+    assert list(Recording([closed, second.path])) == [*some_records(), tick(0, 0.0)]
+
+
+def test_a_later_format_is_named(closed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from gateway.recording import layout
+
+    monkeypatch.setattr(layout, "FORMAT", "3")
+    entries = layout.guarded("shadebus", METADATA)
+    monkeypatch.undo()
+    assert entries["format"] == "3"
+    monkeypatch.setattr("gateway.recording.writer.guarded", lambda *_: entries)
+    recorder = Recorder(closed.with_name("later.mcap"), METADATA)
+    recorder.abandon()
+    with pytest.raises(GatewayError, match=r"is of format 3, .* update shadebus"):
+        Recording(recorder.path)
 
 
 def test_a_recording_torn_anywhere_gives_a_prefix_and_says_so(closed: Path, tmp_path: Path) -> None:
