@@ -4,6 +4,7 @@ Messages are unchunked and each batch reaches the file in one `write()`, so a ki
 accepted, and a power cut loses at most what was not yet synchronised. Any MCAP tool opens the file.
 """
 
+import contextlib
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -82,6 +83,7 @@ class Recorder:
     def __init__(self, path: Path, metadata: dict[str, str]) -> None:
         self.path = path
         self.records = 0
+        self._named = False  # whether the disk was asked to hold the file's name
         self._topics: dict[str, tuple[int, int]] = {}  # channel, and what its CRCs begin with
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -119,14 +121,22 @@ class Recorder:
         self.records += len(records)
 
     def sync(self) -> None:
-        """Ask the disk to hold what was appended."""
+        """Ask the disk to hold what was appended, and at first the file's name too."""
         self._sink.sync()
+        if not self._named:
+            self._named = True
+            with contextlib.suppress(OSError):  # not every file system can be asked that
+                directory = os.open(self.path.parent, os.O_RDONLY | os.O_CLOEXEC)
+                try:
+                    os.fsync(directory)
+                finally:
+                    os.close(directory)
 
     def close(self) -> None:
         """Write the index and close. A file without it stays readable."""
         self._writer.finish()  # type: ignore[no-untyped-call] # the library leaves it so
         self._sink.commit()
-        self._sink.sync()
+        self.sync()
         self._sink.close()
 
     def abandon(self) -> None:

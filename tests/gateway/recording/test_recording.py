@@ -1,7 +1,9 @@
 """A recording holds what was appended, whatever happens to its end."""
 
 import contextlib
+import json
 import struct
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +13,7 @@ from mcap.reader import NonSeekingReader, make_reader
 
 from gateway.errors import GatewayError
 from gateway.recording import Recorder, Recording
-from gateway.records import Record
+from gateway.records import Raw, Record
 from tests.gateway.made import raw, some_records, status, tick
 
 METADATA = {"configuration": "{}", "host": "here"}
@@ -76,6 +78,24 @@ def test_any_mcap_tool_opens_a_closed_recording(closed: Path) -> None:
         "/tick",
     }
     assert summary.statistics.message_count == len(messages) == 6
+
+
+def test_the_layout_is_as_our_page_has_it(closed: Path) -> None:
+    with closed.open("rb") as file:
+        messages = list(make_reader(file).iter_messages())
+    for (_, channel, message), record in zip(messages, some_records(), strict=True):
+        if isinstance(record, Raw):
+            crc, *fields = struct.unpack_from("<IQQQI", message.data)
+            assert crc == zlib.crc32(channel.topic.encode() + message.data[4:])
+            assert [*fields, message.data[32:]] == [record.sequence, *record.stamp, record.dropped_before, record.data]
+        else:
+            text, _, crc_text = message.data.rpartition(b',"crc32":')
+            assert crc_text == b"%d}" % zlib.crc32(channel.topic.encode() + text)
+            assert json.loads(message.data)["stamp"] == record.stamp._asdict()
+        assert (message.sequence, message.log_time, message.publish_time) == (
+            record.sequence,
+            *[record.stamp.utc_ns] * 2,
+        )
 
 
 def test_the_mcap_library_reads_a_torn_recording_up_to_the_tear(closed: Path, tmp_path: Path) -> None:
