@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test rig-test lint bench integrity sensitivity latency load full-load soak calibration dbc setup lock clean
+.PHONY: demo test rig-test lint bench integrity sensitivity latency load full-load soak crash rebaseline calibration dbc setup lock clean
 
 demo: $(READY)
 	$(BIN)/shadebus demo
@@ -48,6 +48,14 @@ full-load: $(READY)
 # A quarter of an hour of faults on every kind of line at once: nothing may grow, nothing may be lost uncounted.
 soak: $(READY)
 	$(BIN)/python -m benchmarks.soak
+
+# A gateway under full buses killed at 200 moments; `make test` takes 20.
+crash: $(READY)
+	CRASH_MOMENTS=200 $(BIN)/pytest tests/gateway/test_crash.py
+
+# The events of the golden recordings as they are now, and what changed; the recordings stay.
+rebaseline: $(READY)
+	$(BIN)/python -m tests.golden.rebaseline
 
 # The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
 calibration: $(READY)

@@ -24,7 +24,7 @@ from gateway.errors import GatewayError
 from monitor import gate
 from monitor.settings import MonitorSettings
 
-OUR_NAMES = ("core", "host", "journal", "radar")  # of what tells events beside the adapters
+OUR_NAMES = ("core", "host", "journal", "radar", "recording")  # of what tells events beside the adapters
 
 
 class _Section(BaseModel):
@@ -163,6 +163,9 @@ class RecordingConfig(_Section):
 
     directory: Path = Path("recordings")
     sync_interval_s: float = Field(1.0, gt=0, le=60)
+    rotate_mib: float = Field(1024, ge=0, le=1 << 20, description="a new file from this size on; 0 for one of any size")
+    rotate_minutes: float = Field(60, ge=0, le=10_000, description="a new file after so long; 0 for one of any length")
+    reserve_mib: float = Field(256, ge=0, le=1 << 20, description="room that is left to others: recording stops before")
     queue_mib: int = Field(64, ge=1, le=4096, description="what adapters may hold back while the disk stalls")
 
 

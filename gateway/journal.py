@@ -1,7 +1,8 @@
 """The journal: the one thread that numbers what happened, writes it down, and only then passes it on.
 
 A record reaches the core after `write()` returned for it, so live order is file order. The journal never waits for the
-core. When the disk fails the recording stops loudly and the records still flow to the core.
+core, and only for `write()` of the disk. When the disk fails the recording stops loudly, the records still flow to the
+core, and the recording goes on once the disk is well.
 """
 
 import time
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 
 from gateway.adapters import Reading
 from gateway.queues import OVERHEAD_BYTES, ByteQueue
-from gateway.recording import Recorder
+from gateway.recording.keeper import NAME, Keeper
 from gateway.records import Note, Raw, Record, Stamp, Status, Tick
 
 TICK_NS = 1_000_000_000
@@ -45,21 +46,13 @@ def now() -> Stamp:
 class Journal:
     """Takes chunks and reports from any thread; writes them; delivers them in order."""
 
-    def __init__(
-        self,
-        recorder: Recorder | None,
-        deliver: Callable[[list[Record]], None],
-        limit_bytes: int,
-        sync_interval_s: float = 1.0,
-    ) -> None:
+    def __init__(self, keeper: Keeper | None, deliver: Callable[[list[Record]], None], limit_bytes: int) -> None:
         self.queue: ByteQueue[Chunk | Report] = ByteQueue(limit_bytes)
-        self.recording_error = ""
-        self._recorder = recorder
+        self._keeper = keeper
         self._deliver = deliver
-        self._sync_interval_ns = int(sync_interval_s * 1e9)
         self._dropped: dict[str, int] = {}
         self._sequence = 0
-        self._last_tick_ns = self._last_sync_ns = time.monotonic_ns()
+        self._last_tick_ns = time.monotonic_ns()
         self._utc_offset_ns: int | None = None
 
     def chunk(self, adapter: str, reading: Reading) -> None:
@@ -79,20 +72,25 @@ class Journal:
 
     def run(self) -> None:
         """The work of the journal's thread, until the queue is closed and empty."""
+        if self._keeper:
+            self._keeper.begin()
         while True:
             until_tick_ns = self._last_tick_ns + TICK_NS - time.monotonic_ns()
             items = self.queue.take(max(until_tick_ns, 0) / 1e9)
             if items is None:
                 break
-            records = [self._numbered(item) for item in items] + self._time()
-            if records:
-                self._keep(records)
-                self._deliver(records)
-        if self._recorder and not self.recording_error:
-            try:
-                self._recorder.close()
-            except OSError as error:  # no room for the index; the records are in the file
-                self._give_up(self._recorder, error)
+            if self._keeper and (said := self._keeper.revive()):
+                items.insert(0, Report(now(), NAME, "LOST", said))
+            self._write([self._numbered(item) for item in items] + self._time())
+        if self._keeper:
+            self._write([self._numbered(Report(now(), NAME, "CLOSED", self._keeper.figures))])
+            self._keeper.end()
+
+    def _write(self, records: list[Record]) -> None:
+        if records:
+            if self._keeper:
+                self._keeper.keep(records)
+            self._deliver(records)
 
     def _numbered(self, item: Chunk | Report) -> Record:
         sequence = self._next()
@@ -113,22 +111,6 @@ class Journal:
             records.append(Note(self._next(), stamp, f"UTC of the host stepped by {step_s:+.3f} s"))
         self._utc_offset_ns = offset_ns
         return records
-
-    def _keep(self, records: list[Record]) -> None:
-        if not self._recorder or self.recording_error:
-            return
-        try:
-            self._recorder.append(records)
-            if records[-1].stamp.monotonic_ns - self._last_sync_ns >= self._sync_interval_ns:
-                self._recorder.sync()
-                self._last_sync_ns = records[-1].stamp.monotonic_ns
-        except OSError as error:
-            self._give_up(self._recorder, error)
-            records.append(Status(self._next(), now(), "recording", "FAILED", self.recording_error))
-
-    def _give_up(self, recorder: Recorder, error: OSError) -> None:
-        self.recording_error = f"{recorder.path}: {error.strerror}; make room and restart"
-        recorder.abandon()
 
     def _next(self) -> int:
         self._sequence += 1

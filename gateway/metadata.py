@@ -8,6 +8,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from gateway.config import RackConfig
+from gateway.doctor.clock import host_clock
 from gateway.errors import GatewayError
 from monitor.calibration import Calibration, load_calibration
 from monitor.integrity import Monitor
@@ -37,7 +38,17 @@ def describe(config: RackConfig, monitor: Monitor | None) -> dict[str, str]:
         "numpy": version("numpy"),
         "python": platform.python_version(),
         "host": platform.node(),
+        "boot": _boot(),
+        "clock": host_clock().seen,
     }
+
+
+def _boot() -> str:
+    """Which start of the host this is: within one, monotonic times can be compared."""
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    except OSError:
+        return ""
 
 
 def recorded_config(metadata: dict[str, str]) -> RackConfig:

@@ -3,7 +3,6 @@
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from itertools import groupby, islice
 
 from gateway.config import RackConfig
@@ -131,5 +130,5 @@ class _Gate:
 def _renamed(record: Record, names: Mapping[str, str]) -> Record:
     """The record under the new name of its adapter."""
     if isinstance(record, Raw | Status) and record.adapter in names:
-        return replace(record, adapter=names[record.adapter])
+        return record._replace(adapter=names[record.adapter])
     return record

@@ -4,7 +4,6 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime
 from pathlib import Path
 
 from gateway.adapters import make_adapter
@@ -14,7 +13,8 @@ from gateway.errors import GatewayError
 from gateway.journal import Journal
 from gateway.metadata import describe
 from gateway.pipeline import Pipeline, Watcher
-from gateway.recording import Recorder, Recording
+from gateway.recording import Recording
+from gateway.recording.keeper import NAME, Keeper
 from gateway.records import Raw
 from gateway.supervision import Supervisor
 from gateway.threads import GuardedThread
@@ -34,14 +34,12 @@ class Service:
     def __init__(self, config: RackConfig, monitor: Monitor | None, emit: Emit, watcher: Watcher | None = None) -> None:
         self.failures: list[str] = []
         self.broken = threading.Event()  # set when a thread that the gateway cannot do without has died
-        self.recording_path: Path | None = None
         self._config = config
         adapters = [(a.name, make_adapter(a)) for a in config.adapters]
-        recorder = self._recorder(monitor)
+        self._keeper = self._keeper_of(config, monitor)
         limit_bytes = (config.recording.queue_mib if config.recording else 64) << 20
-        sync_s = config.recording.sync_interval_s if config.recording else 1.0
         self._to_core = CoreQueue(lambda reason: self._journal.report("core", "BEHIND", reason))
-        self._journal = Journal(recorder, self._to_core.deliver, limit_bytes, sync_s)
+        self._journal = Journal(self._keeper, self._to_core.deliver, limit_bytes)
         self._core = core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, self._core_failed)
 
         def core_work() -> None:
@@ -68,6 +66,11 @@ class Service:
                 self.stop()
                 self._forget_an_empty_recording()
                 raise GatewayError("; ".join(errors))
+
+    @property
+    def recording_path(self) -> Path | None:
+        """The first file of the recording."""
+        return self._keeper.path if self._keeper else None
 
     @property
     def deserted(self) -> Exception | None:
@@ -108,15 +111,19 @@ class Service:
             )
         if self._to_core.skipped:
             self.failures.append(f"core: {self._to_core.skipped} records skipped at the end; replay the recording")
-        if self._journal.recording_error:
-            self.failures.append(f"recording stopped: {self._journal.recording_error}")
+        if self._keeper and self._keeper.failure:
+            self.failures.append(f"recording stopped: {self._keeper.failure}")
+        if self._keeper and self._keeper.lost:
+            self.failures.append(f"recording: {self._keeper.lost} records were not recorded")
 
-    def _recorder(self, monitor: Monitor | None) -> Recorder | None:
-        if self._config.recording is None:
+    def _keeper_of(self, config: RackConfig, monitor: Monitor | None) -> Keeper | None:
+        if config.recording is None:
             return None
-        name = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ.mcap")
-        self.recording_path = self._config.recording.directory / name
-        return Recorder(self.recording_path, describe(self._config, monitor))
+
+        def report(state: str, reason: str) -> None:
+            self._journal.report(NAME, state, reason)
+
+        return Keeper(config.recording, describe(config, monitor), report, self._died)
 
     def _forget_an_empty_recording(self) -> None:
         path = self.recording_path

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import typer
 
 from gateway import kernel_cache
+from gateway.cli.cut import cut
 from gateway.cli.decode import decode_429, decode_708
 from gateway.cli.demo import demo
 from gateway.cli.devices import devices
@@ -16,11 +17,14 @@ from gateway.cli.export import export
 from gateway.cli.importing import import_
 from gateway.cli.info import info
 from gateway.cli.labels import labels
+from gateway.cli.merge import merge
+from gateway.cli.recover import recover
 from gateway.cli.replay import replay
 from gateway.cli.reprocess import reprocess
 from gateway.cli.run import run
 from gateway.cli.simulate import simulate
 from gateway.cli.thresholds import thresholds
+from gateway.cli.verify import verify
 from gateway.errors import GatewayError
 
 app = typer.Typer(
@@ -29,7 +33,8 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for verb in (demo, run, simulate, replay, reprocess, dump, export, info, labels, thresholds, devices, doctor):
+RECORDINGS = (replay, reprocess, dump, info, verify, recover, cut, merge, export)
+for verb in (demo, run, simulate, *RECORDINGS, labels, thresholds, devices, doctor):
     app.command()(verb)
 app.command("import")(import_)
 

@@ -18,6 +18,7 @@ from gateway.exports.parquet import VERDICTS
 from gateway.metadata import build_monitor, recorded_config, recorded_monitor
 from gateway.pipeline import Pipeline
 from gateway.recording import Recording
+from gateway.recording.session import beginnings
 from monitor.integrity import Monitor
 
 RECORDS_AT_ONCE = 1024
@@ -128,7 +129,7 @@ def code_version() -> str:
 
 def jobs(directory: Path, config: RackConfig | None, terrain: Iterable[Path]) -> list[Job]:
     """A job for each recording below a directory. Raises GatewayError if there is none."""
-    paths = sorted(directory.rglob("*.mcap"))
+    paths = beginnings(directory.rglob("*.mcap"))
     if not paths:
         raise GatewayError(f"{directory} holds no recordings (*.mcap): name the directory that they are in")
     written = json.dumps(config.model_dump(mode="json")) if config else ""

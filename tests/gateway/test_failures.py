@@ -1,6 +1,7 @@
 """Nothing in the gateway can die silently: whatever breaks is in `failures`, and what can go on goes on."""
 
 import errno
+import json
 import os
 import signal
 import subprocess
@@ -17,7 +18,8 @@ from gateway.config import RackConfig
 from gateway.errors import GatewayError
 from gateway.events import Event
 from gateway.metadata import build_monitor
-from gateway.recording import Recorder
+from gateway.recording import Recorder, Recording, keeper
+from gateway.recording.verify import verify
 from gateway.records import Raw, Record, Status
 from gateway.service import Service
 from monitor.integrity import Comparison, Verdict
@@ -25,7 +27,7 @@ from monitor.scans import Scan
 from simulators.outlets import PtyOutlet
 from tests.gateway.conftest import TERRAIN, MakeRack
 from tests.gateway.live import Live, recorded_bytes, records, wait_until
-from tests.gateway.shell import GATEWAY, Running, shadebus
+from tests.gateway.shell import GATEWAY, Running
 
 
 @pytest.fixture
@@ -66,21 +68,23 @@ def recorder_that_raises(monkeypatch: pytest.MonkeyPatch, error: Exception, afte
                 raise error
             super().append(records)
 
-    monkeypatch.setattr(service_module, "Recorder", Failing)
+    monkeypatch.setattr(keeper, "Recorder", Failing)
 
 
 def test_a_full_disk_stops_the_recording_loudly_and_the_decoding_goes_on(
     line: PtyOutlet, make_rack: MakeRack, stream: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recorder_that_raises(monkeypatch, OSError(errno.ENOSPC, "No space left on device"), after=3)
+    monkeypatch.setattr(keeper, "LOOK_NS", 1 << 60)  # and no second attempt
     with Background(make_rack(f"serial:{line.path}")) as gateway:
         wait_until(lambda: "UP" in gateway.states("bridge"), "UP")
         line.write(stream)
         wait_until(lambda: sum(event.type == "scan" for event in gateway.events) == 2, "two scans")
         wait_until(lambda: gateway.states("recording") == ["FAILED"], "the failure is told")
-    assert len(gateway.service.failures) == 1
-    assert "recording stopped" in gateway.service.failures[0]
-    assert "No space left on device; make room" in gateway.service.failures[0]
+    stopped, lost = gateway.service.failures
+    assert "recording stopped" in stopped
+    assert "No space left on device; make room" in stopped
+    assert "records were not recorded" in lost
     assert not gateway.service.broken.is_set()
 
 
@@ -195,32 +199,31 @@ def test_a_device_that_cannot_be_opened_stops_everything_at_once(make_rack: Make
     assert [thread.name for thread in threading.enumerate() if "bridge" in thread.name] == []
 
 
-def test_a_write_that_really_fails_leaves_a_recording_that_replays_and_a_non_zero_exit(
+def test_writes_that_really_fail_are_told_and_counted_and_recording_goes_on_in_another_file(
     line: PtyOutlet, stream: bytes, tmp_path: Path
 ) -> None:
     limit = 30_000
     source = ("--source", f"serial:{line.path}", "--dem", TERRAIN, "--record", tmp_path)
     with Running(*source, largest_file=limit) as gateway:
         gateway.wait_for("status", state="UP")
-        for _ in range(3):
-            line.write(stream)
+        line.write(stream)
         gateway.wait_for("status", state="FAILED", adapter="recording")
-        gateway.wait_for("integrity", scan=1)
+        gateway.wait_for("status", state="LOST", adapter="recording")
         line.close()
-        gateway.wait_for("status", state="LOST")
+        gateway.wait_for("status", state="LOST", adapter="bridge0")
         gateway.process.send_signal(signal.SIGTERM)
         assert gateway.end() == 1
-        assert "recording stopped" in gateway.errors
-        assert "File too large; make room" in gateway.errors
+        assert "records were not recorded" in gateway.errors
         assert "Traceback" not in gateway.errors
-    (path,) = tmp_path.glob("*.mcap")
-    assert path.stat().st_size <= limit
-    kept = recorded_bytes(path, "bridge0")
-    assert stream.startswith(kept)
-    assert kept
-    again = shadebus("replay", path, "--json")
-    before = [text for text in again.stdout.splitlines() if '"status"' in text]
-    assert gateway.lines[: len(before)] == before
+        told = [event for event in map(json.loads, gateway.lines) if event.get("adapter") == "recording"]
+    assert any("File too large; make room" in event["reason"] for event in told if event["state"] == "FAILED")
+    (first, *_) = sorted(tmp_path.glob("*.mcap"), key=lambda path: len(path.name))
+    recording = Recording(first)
+    assert len(recording.files) > 1
+    assert all(path.stat().st_size <= limit for path in recording.files)
+    lost = [record for record in recording if isinstance(record, Status) and record[2:4] == ("recording", "LOST")]
+    missing = verify(recording).missing
+    assert missing == sum(int(record.reason.split()[0]) for record in lost) > 0
 
 
 def test_a_disk_that_is_full_from_the_start_is_one_line(line: PtyOutlet, tmp_path: Path) -> None:
@@ -303,4 +306,4 @@ def test_a_driver_that_never_comes_back_is_left_behind_and_told(
         wait_until(entered.is_set, "opening")
     release.set()
     assert gateway.service.failures == ["adapter bridge: its driver does not come back; it is left behind"]
-    assert [record.state for record in records(path_of(gateway)) if isinstance(record, Status)] == ["OPENING"]
+    assert [record.state for record in records(path_of(gateway)) if isinstance(record, Status)] == ["OPENING", "CLOSED"]

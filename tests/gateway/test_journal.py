@@ -1,11 +1,9 @@
 """Everything is numbered, written down and then passed on, in this order."""
 
-import errno
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
@@ -13,33 +11,33 @@ from gateway import journal as journal_module
 from gateway.adapters import stream
 from gateway.journal import Journal
 from gateway.queues import OVERHEAD_BYTES
-from gateway.recording import Recorder
 from gateway.records import Note, Raw, Record, Stamp, Status, Tick
 from tests.gateway.live import wait_until
 
 
 class Log:
-    """A recorder and a receiver that note who was called with what, in order."""
+    """A keeper and a receiver that note who was called with what, in order."""
 
-    path = Path("log.mcap")
+    figures = "as fast as can be"
 
     def __init__(self) -> None:
         self.calls: list[tuple[str, list[Record]]] = []
+        self.revivals: list[str] = []
 
-    def append(self, records: Sequence[Record]) -> None:
-        self.calls.append(("append", list(records)))
+    def begin(self) -> None:
+        self.calls.append(("begin", []))
+
+    def keep(self, records: Sequence[Record]) -> None:
+        self.calls.append(("keep", list(records)))
+
+    def revive(self) -> str:
+        return self.revivals.pop() if self.revivals else ""
 
     def deliver(self, records: Sequence[Record]) -> None:
         self.calls.append(("deliver", list(records)))
 
-    def sync(self) -> None:
-        self.calls.append(("sync", []))
-
-    def close(self) -> None:
-        self.calls.append(("close", []))
-
-    def abandon(self) -> None:
-        self.calls.append(("abandon", []))
+    def end(self) -> None:
+        self.calls.append(("end", []))
 
     def wait_for(self, byte: int) -> None:
         """Wait until a chunk of this one byte was passed on."""
@@ -47,11 +45,13 @@ class Log:
         wait_until(lambda: any(isinstance(r, Raw) and r.data == chunk for r in self.delivered()), f"chunk {byte}")
 
     def delivered(self) -> list[Record]:
-        return [record for name, records in list(self.calls) if name == "deliver" for record in records]
+        """What was passed on, without the keeper's last word."""
+        passed = [record for name, records in list(self.calls) if name == "deliver" for record in records]
+        return [record for record in passed if not (isinstance(record, Status) and record.state == "CLOSED")]
 
 
-def make(log: Log, limit_bytes: int = 1 << 20, sync_interval_s: float = 60.0) -> Journal:
-    return Journal(log, log.deliver, limit_bytes, sync_interval_s)  # type: ignore[arg-type] # as much as it needs
+def make(log: Log, limit_bytes: int = 1 << 20) -> Journal:
+    return Journal(log, log.deliver, limit_bytes)  # type: ignore[arg-type] # as much as it needs
 
 
 @contextmanager
@@ -69,10 +69,11 @@ def test_records_are_written_before_they_are_passed_on() -> None:
     with running(journal := make(log)):
         for k in range(200):
             journal.chunk("bridge", stream(bytes([k])))
-    assert log.calls.pop() == ("close", [])
-    names = [name for name, _ in log.calls]
-    assert names == ["append", "deliver"] * (len(names) // 2)
-    assert all(log.calls[k][1] == log.calls[k + 1][1] for k in range(0, len(names), 2))
+    (first, *between, last) = log.calls
+    assert (first, last) == (("begin", []), ("end", []))
+    names = [name for name, _ in between]
+    assert names == ["keep", "deliver"] * (len(names) // 2)
+    assert all(between[k][1] == between[k + 1][1] for k in range(0, len(names), 2))
     assert b"".join(record.data for record in log.delivered() if isinstance(record, Raw)) == bytes(range(200))
 
 
@@ -132,93 +133,29 @@ def test_a_step_of_utc_is_noted_beside_the_tick(monkeypatch: pytest.MonkeyPatch,
     assert notes == [f"UTC of the host stepped by {text}" for text in said]
 
 
-def test_the_disk_is_asked_to_hold_the_data_at_the_stated_interval() -> None:
+def test_the_last_record_says_how_the_disk_did() -> None:
     log = Log()
-    with running(journal := make(log, sync_interval_s=1e-9)):
-        for k in range(3):
-            journal.chunk("bridge", stream(bytes([k])))
-            log.wait_for(k)
-    names = [name for name, _ in log.calls]
-    assert names == ["append", "sync", "deliver"] * (len(names) // 3) + ["close"]
-
-
-class Failing(Log):
-    """A recorder whose disk fails at the third append, at the first synchronisation, or when it is closed."""
-
-    def __init__(self, failure: str) -> None:
-        super().__init__()
-        self._failure = failure
-
-    def append(self, records: Sequence[Record]) -> None:
-        super().append(records)
-        if self._failure == "append" and sum(name == "append" for name, _ in self.calls) == 3:
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-    def close(self) -> None:
-        super().close()
-        if self._failure == "close":
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-    def sync(self) -> None:
-        super().sync()
-        if self._failure == "sync":
-            raise OSError(errno.EIO, "Input/output error")
-
-
-@pytest.mark.parametrize(("failure", "reason"), [("append", "No space left"), ("sync", "Input/output error")])
-def test_a_failing_disk_stops_the_recording_and_says_so_while_records_flow_on(failure: str, reason: str) -> None:
-    log = Failing(failure)
-    with running(journal := make(log, sync_interval_s=1e-9 if failure == "sync" else 60)):
-        for k in range(20):
-            journal.chunk("bridge", stream(bytes([k])))
-            log.wait_for(k)
-    assert b"".join(record.data for record in log.delivered() if isinstance(record, Raw)) == bytes(range(20))
-    failed = [record for record in log.delivered() if isinstance(record, Status)]
-    assert [(record.adapter, record.state) for record in failed] == [("recording", "FAILED")]
-    assert reason in failed[0].reason and "make room" in failed[0].reason
-    assert journal.recording_error == failed[0].reason
-    names = [name for name, _ in log.calls]
-    assert names.count("abandon") == 1 and "close" not in names
-    assert "append" not in names[names.index("abandon") :]
-
-
-def test_a_disk_that_has_no_room_for_the_index_is_told() -> None:
-    log = Failing("close")
     with running(journal := make(log)):
         journal.chunk("bridge", stream(b"x"))
-    assert "No space left on device; make room" in journal.recording_error
-    assert [name for name, _ in log.calls] == ["append", "deliver", "close", "abandon"]
+    kept = [record for name, records in log.calls if name == "keep" for record in records]
+    assert [type(record) for record in kept] == [Raw, Status]
+    assert kept[-1][2:] == ("recording", "CLOSED", "as fast as can be")
+    assert log.calls[-2] == ("deliver", kept[-1:])
 
 
-def test_sequences_stay_unique_across_a_failing_disk() -> None:
-    log = Failing("append")
-    with running(journal := make(log)):
-        for k in range(10):
-            journal.chunk("bridge", stream(bytes([k])))
-            log.wait_for(k)
-    sequences = [record.sequence for record in log.delivered()]
-    assert sequences == list(range(len(sequences)))
-
-
-def test_a_real_recorder_holds_what_was_passed_on_at_that_moment(tmp_path: Path) -> None:
-    from gateway.recording import Recording
-
-    recorder = Recorder(tmp_path / "a.mcap", {})
-    agreed: list[bool] = []
-    passed: list[Record] = []
-
-    def deliver(records: list[Record]) -> None:
-        passed.extend(records)
-        agreed.append(list(Recording(tmp_path / "a.mcap")) == passed)
-
-    journal = Journal(recorder, deliver, 1 << 20)
+def test_a_recording_that_goes_on_says_so_before_the_next_record() -> None:
+    log = Log()
+    journal = make(log)
+    journal.chunk("bridge", stream(b"x"))
+    log.revivals = ["7 records were not recorded"]
     with running(journal):
-        for k in range(50):
-            journal.chunk("bridge", stream(bytes(k)))
-    assert agreed and all(agreed)
+        log.wait_for(ord("x"))
+    status, chunk = log.delivered()
+    assert isinstance(chunk, Raw)
+    assert (status.sequence, *status[2:]) == (0, "recording", "LOST", "7 records were not recorded")
 
 
-def test_without_a_recorder_records_flow_all_the_same() -> None:
+def test_without_a_keeper_records_flow_all_the_same() -> None:
     passed: list[Record] = []
     keep: Callable[[list[Record]], None] = passed.extend
     with running(journal := Journal(None, keep, 1 << 20)):

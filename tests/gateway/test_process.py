@@ -1,7 +1,6 @@
 """The shipped command as a process: what it prints live is what `replay` prints, and a kill costs nothing accepted."""
 
 import json
-import random
 import signal
 import subprocess
 import sys
@@ -75,11 +74,9 @@ def test_run_and_replay_print_the_same_bytes(
     assert "bins2" in person.stdout
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_killed_gateway_has_lost_no_word_that_its_recording_accepted(
-    stream: bytes, line: PtyOutlet, tmp_path: Path, seed: int
+def test_a_killed_gateway_leaves_a_recording_that_every_verb_reads(
+    stream: bytes, line: PtyOutlet, tmp_path: Path
 ) -> None:
-    moment = random.Random(seed)
     many = stream * 12
     sent = [0]
 
@@ -95,9 +92,8 @@ def test_a_killed_gateway_has_lost_no_word_that_its_recording_accepted(
     with start(line, tmp_path) as gateway:
         gateway.wait_for("status", state="UP")
         sender.start()
-        enough = moment.randrange(100_000, len(many) - 100_000)
+        enough = len(many) // 3
         wait_until(lambda: sent[0] > enough and b'"scan"' in gateway.output, f"{enough} bytes sent and a scan seen")
-        threading.Event().wait(moment.uniform(0, 0.02))  # anywhere in the work on one chunk
         gateway.process.kill()
         assert gateway.end() == -signal.SIGKILL
         line.close()
@@ -110,11 +106,10 @@ def test_a_killed_gateway_has_lost_no_word_that_its_recording_accepted(
     again = "".join(text + "\n" for text in replayed(path))
     assert again.startswith(printed)
     assert '"type":"summary"' not in printed
-    if seed == 0:
-        assert "the file ends without its index" in shadebus("info", path).stdout
-        dump = shadebus("dump", path)
-        assert dump.returncode == 0
-        assert "the file ends without its index" in dump.stderr
-        torn = shadebus("replay", path, "--json")
-        assert torn.stdout == again
-        assert "every whole record was replayed" in torn.stderr
+    assert "the file ends without its index" in shadebus("info", path).stdout
+    dump = shadebus("dump", path)
+    assert dump.returncode == 0
+    assert "the file ends without its index" in dump.stderr
+    torn = shadebus("replay", path, "--json")
+    assert torn.stdout == again
+    assert "every whole record was replayed" in torn.stderr

@@ -14,8 +14,7 @@ import pytest
 from cobs import cobs
 
 from decoders import formats as f
-from gateway import service as service_module
-from gateway.recording import Recorder
+from gateway.recording import Recorder, keeper
 from gateway.records import Record
 from simulators import racklink
 from simulators.outlets import PtyOutlet
@@ -42,7 +41,7 @@ class Disk:
                     time.sleep(STALL_S)
                 super().append(records)
 
-        monkeypatch.setattr(service_module, "Recorder", Stalling)
+        monkeypatch.setattr(keeper, "Recorder", Stalling)
 
 
 @dataclass

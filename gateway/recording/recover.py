@@ -1,0 +1,43 @@
+"""A torn or damaged recording becomes a whole one that says what was lost."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from gateway.recording.session import Recording
+from gateway.recording.whole import write_whole
+from gateway.records import Note, Record
+
+
+def recover(recording: Recording, records: Iterator[Record], out: Path) -> str:
+    """Write what is whole to a new file, and last a note of what was lost; give that note.
+
+    `records` are those of the recording. Raises GatewayError as `write_whole` does.
+    """
+    said = [""]
+
+    def with_note() -> Iterator[Record]:
+        last: Record | None = None
+        missing = 0
+        for record in records:
+            missing += max(record.sequence - last.sequence - 1, 0) if last else 0
+            last = record
+            yield record
+        said[0] = _note(recording, missing)
+        if last:
+            yield Note(last.sequence + 1, last.stamp, said[0])
+
+    write_whole(out, {**recording.metadata, "recovered": f"from {recording.path.name}"}, with_note())
+    return said[0]
+
+
+def _note(recording: Recording, missing: int) -> str:
+    lost = [f"{place.length} bytes at {place.offset} of {place.path.name}: {place.what}" for place in recording.damage]
+    if recording.damaged > len(lost):
+        lost.append(f"{recording.damaged - len(lost)} more damaged places")
+    if recording.torn:
+        lost.append(recording.torn)
+    if missing:
+        lost.append(f"{missing} records are missing between others")
+    return f"recovered {recording.records} records from {recording.path.name}; " + (
+        "; ".join(lost) or "nothing was lost"
+    )

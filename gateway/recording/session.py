@@ -1,0 +1,108 @@
+"""A recording to read: one file, or the files of a rotated session as if they were one."""
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from gateway.errors import GatewayError
+from gateway.recording.layout import FORMAT_KEY, LAYOUTS, MAGIC
+from gateway.recording.reader import OPENING, Damage, FileReader, Findings
+from gateway.recording.window import BLOCK, Window
+from gateway.records import Record
+
+_FOLLOWER = re.compile(r"(.+)\.(\d{4,})")
+
+
+def file_of_session(first: Path, number: int) -> Path:
+    """The path of a session's file by its number, which counts from 1."""
+    return first if number == 1 else first.with_name(f"{first.stem}.{number:04d}{first.suffix}")
+
+
+class Recording:
+    """A recording: its `metadata`, and an iterator over its records in the order they were accepted.
+
+    A file that begins a session stands for all of it, and a directory for the only session in it; a list of files is
+    read as it is. An iteration tells how many `records` were whole, how many places were `damaged`, the first of them
+    in `damage`, and in `torn` of each file that does not end as it should. Raises GatewayError for what is missing or
+    is no recording of ours.
+    """
+
+    def __init__(self, source: Path | Sequence[Path]) -> None:
+        self.files = _files(source) if isinstance(source, Path) else list(source)
+        self.path = source if isinstance(source, Path) else self.files[0]
+        self.metadata = metadata_of(self.files[0])
+        self._found = Findings()
+
+    @property
+    def records(self) -> int:
+        """Whole records in the last iteration."""
+        return self._found.records
+
+    @property
+    def damaged(self) -> int:
+        """Damaged places in the last iteration."""
+        return self._found.damaged
+
+    @property
+    def damage(self) -> list[Damage]:
+        """The first of them."""
+        return self._found.places
+
+    @property
+    def torn(self) -> str:
+        """What is to be said of files without their index."""
+        return "; ".join(f"{path.name}: {text}" if len(self.files) > 1 else text for path, text in self._found.torn)
+
+    def __iter__(self) -> Iterator[Record]:
+        self._found = found = Findings()
+        for path in self.files:
+            yield from read_file(path, found)
+
+
+def read_file(path: Path, found: Findings) -> Iterator[Record]:
+    """The records of one file, which need not even be a recording: then all of it is damaged, or torn."""
+    with Window(path) as window:
+        yield from FileReader(path, window, found).records()
+
+
+def metadata_of(path: Path) -> dict[str, str]:
+    """What a file says of itself. Raises GatewayError if it is no recording, or of a format that we do not know."""
+    with Window(path) as window:
+        window.end = min(window.end, BLOCK)
+        opening = window.get(0, len(OPENING))
+        reader = FileReader(path, window, Findings())
+        next(reader.records(), None)
+    if not reader.metadata and opening != OPENING:
+        if window.size < len(OPENING):
+            raise GatewayError(f"{path} is not a shadebus recording: it ends before its first record")
+        if opening.startswith(MAGIC):
+            raise GatewayError(f"{path} is an MCAP file, but not a shadebus recording")
+        raise GatewayError(f"{path} is not a shadebus recording: it is no MCAP file; look for another copy")
+    version = reader.metadata.get(FORMAT_KEY, "1")
+    if version not in LAYOUTS:
+        raise GatewayError(f"{path} is of format {version}, which a later version of shadebus wrote: update shadebus")
+    return reader.metadata
+
+
+def beginnings(files: Iterable[Path]) -> list[Path]:
+    """Those of some files that do not go on with a session, in order."""
+    return sorted(file for file in files if not _FOLLOWER.fullmatch(file.stem))
+
+
+def _files(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path, *_followers(path)]
+    firsts = beginnings(path.glob("*.mcap"))
+    if len(firsts) != 1:
+        found = ", ".join(file.name for file in firsts) or "none"
+        raise GatewayError(f"{path} is a directory with {len(firsts)} recordings: name one ({found})")
+    return [firsts[0], *_followers(firsts[0])]
+
+
+def _followers(first: Path) -> list[Path]:
+    found: list[tuple[int, Path]] = []
+    for path in first.parent.glob(f"*{first.suffix}"):
+        match = _FOLLOWER.fullmatch(path.stem)
+        if match and match[1] == first.stem:
+            found.append((int(match[2]), path))
+    return [path for _, path in sorted(found)]

@@ -1,0 +1,34 @@
+"""Whole new recordings from records of others; nothing is ever written over, and nothing half done is left."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from gateway.errors import GatewayError
+from gateway.recording.layout import FORMAT_KEY
+from gateway.recording.writer import Recorder
+from gateway.records import Record
+
+BATCH = 1000
+
+
+def write_whole(out: Path, metadata: Mapping[str, str], records: Iterable[Record]) -> int:
+    """Write a recording with its index; how many records it holds. Raises GatewayError if it cannot be written."""
+    if out.exists():
+        raise GatewayError(f"{out} is there already: name another file with -o")
+    recorder = Recorder(out, {key: text for key, text in metadata.items() if key != FORMAT_KEY})
+    batch: list[Record] = []
+    try:
+        for record in records:
+            batch.append(record)
+            if len(batch) == BATCH:
+                recorder.append(batch)
+                batch = []
+        recorder.append(batch)
+        recorder.close()
+    except BaseException as error:
+        recorder.abandon()
+        out.unlink()
+        if isinstance(error, OSError):
+            raise GatewayError(f"cannot write {out}: {error.strerror}; make room") from error
+        raise
+    return recorder.records
