@@ -216,7 +216,8 @@ class Link:
             for name, count in books.counters().items()
         }
         lost = {what.replace(" ", "_").replace("_the_", "_"): count for what, count in self._words_lost().items()}
-        return {**self.framer.counters(), **self.counters, **lost, **words, **peaks}
+        dropped = {f"{self._unit}_dropped": 0}
+        return {**self.framer.counters(), **dropped, **self.counters, **lost, **words, **peaks}
 
     def _words_lost(self) -> dict[str, int]:
         """Words lost on all channels, by where."""
