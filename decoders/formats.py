@@ -17,6 +17,8 @@ TIME_MARK: Final = 0x03
 WORDS_429: Final = 0x10
 WORD_708: Final = 0x20
 
+COUNTS: Final = "<BII"  # of a heartbeat, for each channel: its number, words received, words lost; struct notation
+
 FLAG_FIFO_OVERFLOW: Final = 0x01
 FLAG_PARITY: Final = 0x02
 FLAG_CODING: Final = 0x04

@@ -43,6 +43,7 @@ SHORTEST: Final = f.LINK_HEADER_BYTES + f.LINK_CRC_BYTES
 LONGEST: Final = f.LINK_MAX_BYTES
 PACKET_START: Final = re.compile(rb"(?=[\x03-\xff]\x01)")  # a COBS code that spans the version, 1, and a type
 MOST_STARTS: Final = 256  # of a run; noise has 16 in 4 kB, and a hostile sender shall not keep us busy
+COUNT: Final = struct.Struct(f.COUNTS)
 ENTRY_429: Final = np.dtype([("offset_ns", "<u4"), ("word", "<u4")])
 TIME_LIMIT_NS: Final = 2**63 - 2**32  # a device time above it, 292 years, would overflow once an offset is added
 
@@ -303,8 +304,9 @@ def hello(packet: Packet) -> Hello:
 def heartbeat(packet: Packet) -> tuple[ChannelCount, ...]:
     """The counts of each channel. Raises ValueError for another type, MalformedBody for a body cut short."""
     _require(packet, f.HEARTBEAT, "heartbeat")
-    channels = _parse("HEARTBEAT", packet.body).channels
-    return tuple(ChannelCount(c.channel, c.received, c.lost) for c in channels)
+    if len(packet.body) % COUNT.size:
+        raise MalformedBody(f"{len(packet.body)} bytes are no HEARTBEAT body")
+    return tuple(ChannelCount(*count) for count in COUNT.iter_unpack(packet.body))
 
 
 def time_mark(packet: Packet) -> int:

@@ -35,7 +35,8 @@ Watcher = Callable[[Scan, Verdict, Comparison | None], None]
 class Pipeline:
     """Feed it records in order; it gives events. `watcher` sees each scan with its verdict, for reports and exports.
 
-    Behind a scan that it sees stand the `aircraft` and the `listener` of that moment.
+    Without `tells_state` no tick tells the aircraft's state. Behind a scan that `watcher` sees stand the `aircraft` and
+    the `listener` of that moment.
 
     A pipeline that follows one that failed takes over its counters, the events it had not given yet and what it knew of
     the channels, and nothing else.
@@ -47,10 +48,13 @@ class Pipeline:
         monitor: Monitor | None,
         watcher: Watcher | None = None,
         before: "Pipeline | None" = None,
+        *,
+        tells_state: bool = True,
     ) -> None:
         self._config = config
         self._monitor = monitor
         self._watcher = watcher
+        self._tells_state = tells_state
         self._telling: Telling = before._telling if before else Telling()
         self.listener = Listener(config, self._telling, self._read, self._clock_began_anew)
         self.aircraft = Aircraft(config.monitor.height_source)
@@ -229,7 +233,8 @@ class Pipeline:
                 self._doubted.add(quantity)
                 self._troubles[quantity] = f"degraded: {quantity}: {doubt}"
                 self._telling.tell(quantity, "STATE_DOUBT", doubt)
-        self._telling.say(self._state(record))
+        if self._tells_state:
+            self._telling.say(self._state(record))
 
     def _state(self, record: Tick) -> StateEvent:
         heard_ns = self.listener.now_host_ns

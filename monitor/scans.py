@@ -118,25 +118,31 @@ class ScanBuilder:
     def feed(self, time_ns: NDArray[np.int64], radials: Radials) -> Iterator[Scan]:
         """Take radials (n,) in order of time; give the scans that they complete."""
         limits = (radials.annunciations >> 4 & 1).astype(bool)  # header bit 17, the fifth annunciation
-        columns = (radials.tilt_deg, radials.range_nm, radials.mode, radials.stabilised, radials.faults)
-        rows = zip(
-            time_ns.tolist(),
-            radials.scan_angle_deg.tolist(),
-            limits.tolist(),
-            radials.bins,
-            *(column.tolist() for column in columns),
-            strict=True,
+        columns = (radials.tilt_deg, radials.range_nm, radials.mode, radials.stabilised)
+        settings = list(
+            zip(*(column.tolist() for column in columns), [radials.bins.shape[1]] * len(time_ns), strict=True)
         )
-        for time, angle, beyond, bins, tilt, range_nm, mode, stabilised, faults in rows:
-            settings = (tilt, range_nm, mode, stabilised, len(bins))
+        rows = list(zip(time_ns.tolist(), radials.scan_angle_deg.tolist(), limits.tolist(), radials.bins, strict=True))
+        onward = _onward(time_ns, radials)
+        k = 0
+        while k < len(rows):
+            time, angle, _, _ = rows[k]
             if self._rows:
                 turned, broken = self._turns(angle), self._breaks(time, angle)
-                if turned or broken or settings != self._settings:
+                if turned or broken or settings[k] != self._settings:
                     yield self._close(whole=turned and not broken)
-            self._settings = settings
-            self._faults |= faults
+            self._settings = settings[k]
             self._follow(time, angle)
-            self._rows.append((time, angle, beyond, bins))
+            end = k + 1
+            if self._direction and self._farthest_deg == angle == self._rest_deg:
+                end += int(np.argmax(np.r_[onward[end:] != self._direction, True]))  # those that only go on
+                end = min(end, k + LONGEST_SWEEP - len(self._rows))
+            if end > k + 1:
+                self._farthest_deg = self._rest_deg = rows[end - 1][1]
+                self._moved_ns, self._at_rest = rows[end - 1][0], 0
+            self._faults |= int(np.bitwise_or.reduce(radials.faults[k:end]))
+            self._rows += rows[k:end]
+            k = end
 
     def finish(self) -> Iterator[Scan]:
         """Give the sweep that is still open, if any."""
@@ -204,6 +210,16 @@ class ScanBuilder:
         self._faults = 0
         self._began_whole = whole
         return scan
+
+
+def _onward(time_ns: NDArray[np.int64], radials: Radials) -> NDArray[np.float64]:
+    """Of radials (n,): the sign of a step from the one before that ends no sweep if it goes the sweep's way, else 0."""
+    steps = wrap(np.diff(radials.scan_angle_deg))
+    waited_ns = np.diff(time_ns)
+    plain = (np.abs(steps) > JITTER_DEG) & (np.abs(steps) <= JUMP_DEG) & (waited_ns >= 0) & (waited_ns <= SILENCE_NS)
+    for column in (radials.tilt_deg, radials.range_nm, radials.mode, radials.stabilised):
+        plain &= column[1:] == column[:-1]
+    return np.concatenate([[0.0], np.where(plain, np.sign(steps), 0.0)])
 
 
 def _usual(steps_deg: NDArray[np.float64]) -> float:

@@ -78,7 +78,7 @@ def work(job: Job) -> Outcome:
             counters.update(event.counters)
 
     failures: list[str] = []
-    core = Core(lambda before: Pipeline(config, monitor, before=before), take, failures.append)
+    core = Core(lambda before: Pipeline(config, monitor, before=before, tells_state=False), take, failures.append)
     records = iter(recording)
     first = last = None
     while block := list(islice(records, RECORDS_AT_ONCE)):
