@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test rig-test lint bench integrity sensitivity latency load full-load soak crash rebaseline calibration dbc setup lock clean
+.PHONY: demo test rig-test lint bench integrity sensitivity latency load full-load hours soak crash rebaseline calibration dbc setup lock clean
 
 demo: $(READY)
 	$(BIN)/shadebus demo
@@ -40,6 +40,10 @@ latency: $(READY)
 # What share of one core a rack at live rates takes.
 load: $(READY)
 	$(BIN)/python -m benchmarks.load
+
+# Hours of recorded flight worked out again: times real time, cost against hours, memory; some minutes.
+hours: $(READY)
+	$(BIN)/python -m benchmarks.hours
 
 # Full buses over each kind of line for a minute: words lost, share of a core, memory, and time to the event.
 full-load: $(READY)

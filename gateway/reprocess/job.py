@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,6 +22,8 @@ from gateway.recording.session import beginnings
 from monitor.integrity import Monitor
 
 RECORDS_AT_ONCE = 1024
+MADE_WITH = ("configuration", "calibration", "terrain_checksum")  # of the metadata, what decides how it is judged
+SET_UPS = 4  # kept: each has its terrain in memory
 CODE = ("decoders", "monitor", "gateway")  # whose sources decide what comes out
 OF_THE_SCAN = ("radials", pa.int64()), ("range_nm", pa.float64()), ("tilt_deg", pa.float64())
 COLUMNS = pa.schema([("recording", pa.string()), *OF_THE_SCAN, *VERDICTS])
@@ -52,7 +54,10 @@ def key(job: Job) -> str:
     A file counts as the same while its size and time of change are. Raises GatewayError as `work` does.
     """
     recording = Recording(job.path)
-    config, monitor = _set_up(job, recording)
+    return _key(recording, *_set_up(job, recording))
+
+
+def _key(recording: Recording, config: RackConfig, monitor: Monitor | None) -> str:
     files = [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in recording.files]
     calibration = monitor.calibration.model_dump_json() if monitor and monitor.calibration else ""
     terrain = monitor.terrain.checksum if monitor else ""
@@ -87,7 +92,7 @@ def work(job: Job) -> Outcome:
     core.finish()
     whole = {
         "recording": job.name,
-        "key": key(job),
+        "key": _key(recording, config, monitor),
         "begins_utc_ns": first.utc_ns if first else None,
         "seconds": (last.monotonic_ns - first.monotonic_ns) / 1e9 if first and last else 0.0,
         "records": recording.records,
@@ -100,13 +105,25 @@ def work(job: Job) -> Outcome:
 
 
 def _set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
-    if not job.config:
-        config = recorded_config(recording.metadata)
-        return config, recorded_monitor(recording.metadata, config, job.terrain)
-    config = RackConfig.model_validate_json(job.config)
-    if job.terrain:
-        config = config.model_copy(update={"terrain": job.terrain})
-    return config, build_monitor(config)
+    """How a recording is to be read and judged."""
+    config = RackConfig.model_validate_json(job.config) if job.config else recorded_config(recording.metadata)
+    files = [(path, path.stat().st_mtime_ns) for path in job.terrain or config.terrain if path.exists()]
+    made_with = tuple((name, recording.metadata[name]) for name in MADE_WITH if name in recording.metadata)
+    return _made(job.config, job.terrain, made_with, tuple(files))
+
+
+@lru_cache(maxsize=SET_UPS)
+def _made(
+    config: str, terrain: tuple[Path, ...], metadata: tuple[tuple[str, str], ...], _: tuple[tuple[Path, int], ...]
+) -> tuple[RackConfig, Monitor | None]:
+    """The same for all recordings that were made alike, as long as the terrain files are the same."""
+    if not config:
+        recorded = recorded_config(dict(metadata))
+        return recorded, recorded_monitor(dict(metadata), recorded, terrain)
+    given = RackConfig.model_validate_json(config)
+    if terrain:
+        given = given.model_copy(update={"terrain": terrain})
+    return given, build_monitor(given)
 
 
 def _row(name: str, event: IntegrityEvent, scan: ScanEvent | None) -> dict[str, Any]:

@@ -1,0 +1,135 @@
+"""How many times real time recorded flights are worked out again on all cores. `make hours`.
+
+A recorded flight is two minutes over real terrain: a radar of 80 words/s, an IRU and a GNSS bus full to the brim (2778
+words/s each), a radio altimeter, in packets and chunks of 10 ms. An hour is thirty such recordings. What is timed is
+`shadebus reprocess` as it is shipped, from reading the files to the data set on disk, beside a plain copy of the files.
+"""
+
+import resource
+import shutil
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.load import BUSES, USED
+from decoders import formats as f
+from decoders.definitions import load_definitions
+from decoders.racklink import Framer, Packet, words429
+from gateway.config import check_config
+from gateway.metadata import build_monitor, describe
+from gateway.recording import Recorder
+from gateway.records import Raw, Record, Stamp, Tick
+from gateway.reprocess.dataset import DataSet
+from gateway.reprocess.job import jobs
+from gateway.reprocess.run import reprocess
+from monitor.utc import UTC_LABELS
+from simulators import arinc429, racklink
+from simulators.link import whole_stream
+from simulators.scenario import BUILT_IN_TERRAIN, white_mountains
+
+SECONDS = 120
+AN_HOUR = 3600 // SECONDS
+HOURS = (1, 4, 16)
+CHUNK_NS = 10_000_000
+SECOND_NS = 1_000_000_000
+WORD_NS = f.WORD_429_BIT_TIMES * f.HIGH_SPEED_BIT_NS
+FULL = (1, 2)  # channels: IRU and GNSS
+EPOCH_NS = 1_780_000_000 * SECOND_NS
+
+
+def main() -> None:
+    """Print a line for each number of hours."""
+    with tempfile.TemporaryDirectory() as place:
+        flight = Path(place) / "flight.mcap"
+        record(flight)
+        print(f"{flight.stat().st_size * AN_HOUR / 2**20:.0f} MiB an hour, in {AN_HOUR} recordings")
+        for hours in HOURS:
+            _measure(Path(place) / f"{hours}", flight, hours)
+
+
+def _measure(place: Path, flight: Path, hours: int) -> None:
+    recordings = place / "recordings"
+    recordings.mkdir(parents=True)
+    for number in range(hours * AN_HOUR):
+        (recordings / f"{number:03d}.mcap").hardlink_to(flight)
+    listed = jobs(recordings, None, ())
+    began = time.perf_counter()
+    shutil.copytree(recordings, place / "copy")
+    copied_s = time.perf_counter() - began
+    shutil.rmtree(place / "copy")
+    marks: list[float] = []
+
+    def mark(_done: int, _of: int) -> None:
+        marks.append(time.perf_counter())
+
+    began = time.perf_counter()
+    done = reprocess(listed, DataSet(place / "out"), None, mark)
+    whole_s = time.perf_counter() - began
+    if len(done.made) != len(listed):
+        raise SystemExit(f"{len(done.made)} of {len(listed)} were worked out: {done.failed}")
+    flown_s = hours * 3600.0
+    steady = SECONDS * (len(marks) - 2) / (marks[-1] - marks[1])  # from the first result to the last
+    largest_mib = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    print(
+        f"{hours:2d} h: {whole_s:6.1f} s, {flown_s / whole_s:4.0f} times real time; from the first result on "
+        f"{steady:4.0f} times; {whole_s / copied_s:.0f} times a copy of the files ({copied_s:.2f} s); "
+        f"largest worker {largest_mib:.0f} MiB"
+    )
+
+
+def record(path: Path) -> None:
+    """Record the two minutes."""
+    chunks: dict[int, list[Packet]] = {}
+    for packet in _packets():
+        chunks.setdefault(packet.time_ns // CHUNK_NS, []).append(packet)
+    records: list[Record] = []
+    sequence = 0
+    for chunk in sorted(chunks):
+        stamp = Stamp((chunk + 1) * CHUNK_NS, (chunk + 1) * CHUNK_NS + EPOCH_NS)
+        encoded = [
+            racklink.encode(p.type, p.channel, sequence + k, p.time_ns, p.body) for k, p in enumerate(chunks[chunk])
+        ]
+        sequence += len(encoded)
+        records.append(Raw(len(records), stamp, "bridge", b"".join(encoded)))
+        if chunk * CHUNK_NS % SECOND_NS == 0:
+            records.append(Tick(len(records), stamp))
+    table = {"adapters": [{"name": "bridge", "source": "serial:x"}], "terrain": [BUILT_IN_TERRAIN["white_mountains"]]}
+    config = check_config(table, "hours")
+    recorder = Recorder(path, describe(config, build_monitor(config)))
+    recorder.append(records)
+    recorder.close()
+
+
+def _packets() -> list[Packet]:
+    flown = Framer().feed(whole_stream(white_mountains(SECONDS)))
+    packets = [p for p in flown if p.type != f.WORDS_429 or p.channel not in FULL]
+    for channel in FULL:
+        own = [words429(p) for p in flown if p.type == f.WORDS_429 and p.channel == channel]
+        packets += _full_bus(
+            channel, np.concatenate([w.time_ns for w in own]), np.concatenate([w.words for w in own]).astype(np.int64)
+        )
+    return sorted(packets, key=lambda packet: packet.time_ns)
+
+
+def _full_bus(channel: int, times_ns: NDArray[np.int64], words: NDArray[np.int64]) -> list[Packet]:
+    """The bus of a flight with every free slot filled by labels that are decoded and used for nothing."""
+    labels = sorted(load_definitions(BUSES[channel]).labels.keys() - USED - UTC_LABELS)
+    free = np.setdiff1d(np.arange(SECONDS * SECOND_NS // WORD_NS), times_ns // WORD_NS) * WORD_NS
+    fillers = np.array([int(arinc429.encode_data(label, [0], ssm=3)[0]) for label in labels])
+    times_ns = np.r_[times_ns, free]
+    words = np.r_[words, fillers[np.arange(len(free)) % len(fillers)]]
+    order = np.argsort(times_ns, kind="stable")
+    times_ns, words = times_ns[order], words[order]
+    cuts = np.flatnonzero(np.diff(times_ns // CHUNK_NS)) + 1
+    packets = []
+    for some_ns, some in zip(np.split(times_ns, cuts), np.split(words, cuts), strict=True):
+        body = racklink.words_429((some_ns - some_ns[0]).tolist(), some.tolist())
+        packets.append(Packet(f.WORDS_429, channel, 0, 0, int(some_ns[0]), body))
+    return packets
+
+
+if __name__ == "__main__":
+    main()
