@@ -1,14 +1,23 @@
 """Hand the recordings out to workers and keep what comes back; a worker that dies costs time and nothing else."""
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from distributed import Client, LocalCluster, as_completed
 
 from gateway.errors import GatewayError
 from gateway.reprocess.dataset import DataSet
 from gateway.reprocess.job import Job, key, work
+
+LOCAL: Final = {
+    "processes": True,
+    "threads_per_worker": 1,
+    "dashboard_address": None,
+    "host": "127.0.0.1",
+    "silence_logs": logging.ERROR,  # that a worker took its time to end is nobody's concern
+}
 
 
 class Done(NamedTuple):
@@ -66,7 +75,7 @@ def _client(scheduler: str | None, most: int) -> Iterator[Client]:
         with client:
             yield client
     else:
-        with LocalCluster(processes=True, threads_per_worker=1, dashboard_address=None, host="127.0.0.1") as cluster:
+        with LocalCluster(**LOCAL) as cluster:
             cluster.scale(min(most, len(cluster.workers)))
             with Client(cluster) as client:
                 yield client
