@@ -57,14 +57,24 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Both threads of one scan on the radials in use: what a picture or a calibration needs."""
+    """Both threads of one scan on the radials in use (n,), and their pairs of shadows (N,): for pictures and exports.
+
+    Centres of shadows are in range bins; `pair_radial` is the index of a pair's radial among those in use.
+    """
 
     scan_angle_deg: NDArray[np.float64]
     radar_states: NDArray[np.int8]
     dem_states: NDArray[np.int8]
-    disparities: NDArray[np.float64]
+    pair_radial: NDArray[np.int64]
+    radar_centre: NDArray[np.float64]
+    dem_centre: NDArray[np.float64]
     unmatched_radar: float | None
     unmatched_dem: float | None
+
+    @property
+    def disparities(self) -> NDArray[np.float64]:
+        """D of eq. (6), range bins."""
+        return self.radar_centre - self.dem_centre
 
 
 class Monitor:
@@ -163,12 +173,13 @@ class Monitor:
         # Range-limited shadows stay out before pairing: one of them must not take the place of a whole one.
         whole, foreseen = seen[~seen["range_limited"]], predicted[~predicted["range_limited"]]
         pairs = pair(whole, foreseen)
-        d = whole["centre"][pairs["radar"]] - foreseen["centre"][pairs["dem"]]
         return Comparison(
             scan.scan_angle_deg[radials],
             radar,
             dem,
-            d,
+            pairs["radial"],
+            whole["centre"][pairs["radar"]],
+            foreseen["centre"][pairs["dem"]],
             _share(*unmatched_share(seen, predicted, dem)),
             _share(*unmatched_share(predicted, seen, radar)),
         ), int(np.count_nonzero(void))

@@ -15,8 +15,6 @@ from gateway.exports.labels import SCHEMA, batches
 from gateway.exports.scans import Judged, judged, monitor_of
 from gateway.link import SPOILT
 from gateway.words import Word708
-from monitor.integrity import Monitor
-from monitor.shade import pair, shadows
 
 ROWS = 4096  # of a row group whose rows are gathered one by one
 RADIALS = pa.schema(
@@ -137,7 +135,7 @@ def export(job: Job, path: Path) -> str:
                 fields = vars(item)
                 said.add({"utc_ns": item.time_ns, **{name: fields[name] for name in VERDICTS.names if name in fields}})
             else:
-                for row in disparity_rows(item, monitor):
+                for row in disparity_rows(item):
                     pairs.add(row)
     return f"{labels.rows} labels, {radials.rows} radials, {pairs.rows} disparities, {said.rows} verdicts"
 
@@ -163,22 +161,17 @@ def radial_row(word: Word708) -> dict[str, Any]:
     return row
 
 
-def disparity_rows(item: Judged, monitor: Monitor) -> list[dict[str, Any]]:
-    """The pairs of shadows of a scan, found again in both threads as the monitor finds them."""
-    compared, settings = item.comparison, monitor.settings
+def disparity_rows(item: Judged) -> list[dict[str, Any]]:
+    """The pairs of shadows of a scan."""
+    compared = item.comparison
     if compared is None:
         return []
-    sizes = settings.minimum_size, settings.maximum_size
-    seen = shadows(compared.radar_states, "radar", *sizes)
-    predicted = shadows(compared.dem_states, "dem", *sizes)
-    whole, foreseen = seen[~seen["range_limited"]], predicted[~predicted["range_limited"]]
-    pairs = pair(whole, foreseen)
-    columns = zip(
-        compared.scan_angle_deg[pairs["radial"]].tolist(),
-        whole["centre"][pairs["radar"]].tolist(),
-        foreseen["centre"][pairs["dem"]].tolist(),
-        compared.disparities.tolist(),
-        strict=True,
+    columns = (
+        compared.scan_angle_deg[compared.pair_radial],
+        compared.radar_centre,
+        compared.dem_centre,
+        compared.disparities,
     )
     here = int(item.utc_ns.max()), item.scan.number
-    return [dict(zip(DISPARITIES.names, (*here, *values), strict=True)) for values in columns]
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    return [dict(zip(DISPARITIES.names, (*here, *values), strict=True)) for values in rows]
