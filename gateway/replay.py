@@ -46,7 +46,7 @@ def replay(
     pace = _Pace(speed, start_s, halt)
     gate = _Gate(emit, step, halt, pace)
     core = Core(lambda before: Pipeline(config, monitor, watcher, before), gate.emit, report)
-    at_once = 1 if speed or step else RECORDS_AT_ONCE
+    at_once = 1 if speed or step or watcher else RECORDS_AT_ONCE  # who watches hears each event before the next
     elapsed_s = 0.0
     timed = _timed(recording, stop_s)
     for begun, shown in groupby(timed, lambda item: item[0] >= start_s):

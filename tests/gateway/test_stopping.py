@@ -15,11 +15,12 @@ from gateway.config import check_config
 from gateway.metadata import describe
 from gateway.recording import Recorder
 from gateway.records import Raw, Record
+from gateway.stopping import PATIENCE_S
 from tests.gateway.live import wait_until
 from tests.gateway.made import stamp, tick
 from tests.gateway.shell import GATEWAY
 
-SOON_S = 2.0
+SOON_S = PATIENCE_S + 3.0  # a kernel that is being compiled takes all the patience
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import pytest
 
 from gateway.errors import GatewayError
 from gateway.exports import FORMATS, export
+from gateway.recording import Recorder, Recording
 from gateway.stopping import Stop
 from tests.gateway.exports.recorded import TERRAIN, Flown, To, record
 from tests.gateway.made import IRU, RACK, Bridge, raw
@@ -97,8 +98,13 @@ def test_a_recording_whose_terrain_has_gone_is_exported_without_it(
     flown: Flown, tmp_path: Path, to: To, stop: Stop
 ) -> None:
     elsewhere = tmp_path / "elsewhere.mcap"
-    data = flown.path.read_bytes()
-    elsewhere.write_bytes(data.replace(TERRAIN.name.encode(), TERRAIN.name.replace("N44", "N99").encode()))
+    source = Recording(flown.path)
+    gone = {
+        name: text.replace(TERRAIN.name, TERRAIN.name.replace("N44", "N99")) for name, text in source.metadata.items()
+    }
+    recorder = Recorder(elsewhere, gone)
+    recorder.append(list(source))
+    recorder.close()
     with pytest.raises(GatewayError, match=r"N99W072.hgt does not exist"):
         export(elsewhere, "parquet", tmp_path / "tables", stop)
     words = f"{len(flown.words)} labels, {len(flown.radar)} radials"
