@@ -48,9 +48,10 @@ class RecordFramer(PacketFramer):
         self._packets: list[Packet] = []
         self._blocks: dict[int, tuple[int, Block]] = {}  # by channel: flags of its words, and they
 
-    def spans(self, data: bytes, number: int) -> list[Span]:
+    def spans(self, data: bytes, number: int, whole: bool = False) -> list[Span]:
         """The whole records, and other spans, that data begin with; `number` of them came before. The rest is cut off.
 
+        `whole` data are all that there is: nothing comes that could tell more of their last records.
         It does not depend on what was fed, so that a file can be cut where its records end.
         """
         raise NotImplementedError
@@ -107,10 +108,11 @@ class RecordFramer(PacketFramer):
 class SeqrecordFramer(RecordFramer):
     """Ballard's sequential records: ARINC 429 and 708 in one file, each record with its channel."""
 
-    def spans(self, data: bytes, number: int) -> list[Span]:  # noqa: ARG002 # each says its own time
+    def spans(self, data: bytes, number: int, whole: bool = False) -> list[Span]:  # noqa: ARG002 # each says its own time
         """Records, and what lies between them."""
         return [
-            Span(size, None if kind not in SIZES else self._time_ns(data, at, size)) for at, size, kind in _walk(data)
+            Span(size, None if kind not in SIZES else self._time_ns(data, at, size))
+            for at, size, kind in _walk(data, whole)
         ]
 
     def _time_ns(self, data: bytes, at: int, size: int) -> int:
@@ -120,7 +122,7 @@ class SeqrecordFramer(RecordFramer):
     def _take(self, data: bytes) -> int:
         framed = 0
         words, radar = bytearray(), bytearray()
-        for at, size, kind in _walk(data):
+        for at, size, kind in _walk(data, whole=True):
             if kind == "garbage":
                 self.bad_records += 1
                 continue
@@ -157,28 +159,54 @@ Kind = int | Literal["garbage"]
 SIZES: Final = {v.SEQRECORD_TYPE_429: v.SEQRECORD_429.itemsize, v.SEQRECORD_TYPE_708: v.SEQRECORD_708.itemsize}
 
 
-def _walk(data: bytes) -> Iterator[tuple[int, int, Kind]]:
+FARTHEST: Final = max(SIZES.values()) + HEAD.size  # behind a record, what tells whether it is one
+
+
+def _walk(data: bytes, whole: bool) -> Iterator[tuple[int, int, Kind]]:
     """Place, size and type of each record that is whole, and of each stretch of garbage between them.
 
-    Whether a record begins somewhere depends on nothing that lies before: data may be cut at any of these places.
+    Records have no checksum, but each is followed by another, or by nothing. One that is not, is one all the same if
+    its layout is known and no record that is followed begins inside it, as it would where a byte was lost. If the data
+    are not the `whole` of what there is, the walk ends where that cannot be told yet. Whether a record begins somewhere
+    depends on nothing that lies before: data may be cut at any of these places.
     """
     at = garbage = 0
     while at + HEAD.size <= len(data):
-        said, count = HEAD.unpack_from(data, at)
-        kind, size = said & v.SEQRECORD_TYPE_MASK, count * v.SEQRECORD_COUNT_BYTES
-        other = kind in v.SEQRECORD_OTHER_TYPES and v.SEQRECORD_SHORTEST <= size <= v.SEQRECORD_LONGEST
-        if not other and size != SIZES.get(kind):
-            at += v.SEQRECORD_COUNT_BYTES
+        kind, size = _head(data, at)
+        end = at + size
+        followed = size > 0 and end <= len(data) and _followed(data, end)
+        needed = end + (FARTHEST if kind in SIZES else HEAD.size)  # to tell of one that is not
+        if size and not followed and not whole and needed > len(data):
+            break
+        if not size or end > len(data) or not (followed or (kind in SIZES and _intact(data, at, end))):
+            at += 1
             continue
         if garbage < at:
             yield garbage, at - garbage, "garbage"
-        garbage = at
-        if at + size > len(data):
-            return
         yield at, size, kind
-        at = garbage = at + size
+        at = garbage = end
     if garbage < at:
         yield garbage, at - garbage, "garbage"
+
+
+def _followed(data: bytes, end: int) -> bool:
+    return end == len(data) or _head(data, end)[1] > 0
+
+
+def _intact(data: bytes, at: int, end: int) -> bool:
+    """Whether no record that is followed begins inside data[at:end] behind its first byte."""
+    inside = ((k, _head(data, k)[1]) for k in range(at + 1, end))
+    return not any(size and k + size > end and _followed(data, k + size) for k, size in inside)
+
+
+def _head(data: bytes, at: int) -> tuple[int, int]:
+    """Type and size of the record that may begin at a place; size 0 if none can."""
+    if at + HEAD.size > len(data):
+        return 0, 0
+    said, count = HEAD.unpack_from(data, at)
+    kind, size = said & v.SEQRECORD_TYPE_MASK, count * v.SEQRECORD_COUNT_BYTES
+    other = kind in v.SEQRECORD_OTHER_TYPES and v.SEQRECORD_SHORTEST <= size <= v.SEQRECORD_LONGEST
+    return kind, size if other or size == SIZES.get(kind) else 0
 
 
 def _channels(records: Records) -> list[int]:
@@ -198,7 +226,7 @@ class FixedFramer(RecordFramer):
 
     LAYOUT: ClassVar[np.dtype[Any]]
 
-    def spans(self, data: bytes, number: int) -> list[Span]:
+    def spans(self, data: bytes, number: int, whole: bool = False) -> list[Span]:  # noqa: ARG002 # all tell alike
         """The whole records."""
         records = self._whole(data)
         return [Span(self.LAYOUT.itemsize, time_ns) for time_ns in self._record_times_ns(records, number)]

@@ -17,11 +17,11 @@ from monitor.terrain import TerrainError, open_terrain
 
 def build_monitor(config: RackConfig, calibration: Calibration | None = None) -> Monitor | None:
     """The monitor that a configuration asks for, or None without terrain. Raises GatewayError naming the file."""
-    if not config.terrain:
-        return None
     try:
         if calibration is None and config.calibration:
             calibration = load_calibration(config.calibration)
+        if not config.terrain:
+            return None
         return Monitor(open_terrain(config.terrain), config.monitor, calibration)
     except (TerrainError, ValueError) as error:
         raise GatewayError(str(error)) from error

@@ -212,6 +212,8 @@ def load(path: Path) -> Scenario:
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
         scenario = Scenario.model_validate(document)
+    except OSError as error:
+        raise ValueError(f"scenario {path}: {error.strerror}: name another file") from None
     except (tomllib.TOMLDecodeError, ValidationError) as error:
         raise ValueError(f"scenario {path}: {error}") from None
     world = scenario.world

@@ -16,12 +16,18 @@ def verify(
     from gateway.stopping import Stop
 
     stop = Stop()  # before the imports that take their time
+    from gateway.errors import GatewayError
     from gateway.recording import Recording
     from gateway.recording.verify import verify as look
 
     wrong = 0
     for path in recordings:
-        recording = Recording(path)
+        try:
+            recording = Recording(path)
+        except GatewayError as error:
+            typer.echo(f"{path}: NOT sound: {error}")
+            wrong += 1
+            continue
         found = look(recording, stop.until)
         for line in [*found.remarks, *found.problems]:
             typer.echo(f"  {line}")

@@ -51,12 +51,23 @@ def cut(sources: Iterable[Source], adapter: str, framer: RecordFramer) -> Iterat
     time_ns: int | None = None
     for source in sources:
         rest = b""
-        for block in source.blocks():
+        for block, last in _with_last(source.blocks()):
             data, at = rest + block, 0
-            for span in framer.spans(data, number):
+            for span in framer.spans(data, number, whole=last):
                 number += 1
                 time_ns = time_ns if span.time_ns is None else span.time_ns
                 yield Piece(time_ns, adapter, data[at : at + span.size])
                 at += span.size
             rest = data[at:]
         yield Piece(time_ns, adapter, rest, ends=True)  # a torn record may be left
+
+
+def _with_last(blocks: Iterable[bytes]) -> Iterator[tuple[bytes, bool]]:
+    """Each block, and whether it is the last."""
+    before: bytes | None = None
+    for block in blocks:
+        if before is not None:
+            yield before, False
+        before = block
+    if before is not None:
+        yield before, True

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from gateway.recording.session import Recording
 from gateway.recording.whole import write_whole
-from gateway.records import Note, Record
+from gateway.records import Note, Raw, Record
 
 
 def recover(recording: Recording, records: Iterator[Record], out: Path) -> str:
@@ -17,12 +17,17 @@ def recover(recording: Recording, records: Iterator[Record], out: Path) -> str:
 
     def with_note() -> Iterator[Record]:
         last: Record | None = None
-        missing = 0
+        missing = again = 0
+        surely = -1  # the latest sequence of a raw record, which its CRC vouches for in every format
         for record in records:
+            if record.sequence <= surely:
+                again += 1
+                continue
             missing += max(record.sequence - last.sequence - 1, 0) if last else 0
             last = record
+            surely = record.sequence if isinstance(record, Raw) else surely
             yield record
-        said[0] = _note(recording, missing)
+        said[0] = _note(recording, missing, again)
         if last:
             yield Note(last.sequence + 1, last.stamp, said[0])
 
@@ -30,7 +35,7 @@ def recover(recording: Recording, records: Iterator[Record], out: Path) -> str:
     return said[0]
 
 
-def _note(recording: Recording, missing: int) -> str:
+def _note(recording: Recording, missing: int, again: int) -> str:
     lost = [f"{place.length} bytes at {place.offset} of {place.path.name}: {place.what}" for place in recording.damage]
     if recording.damaged > len(lost):
         lost.append(f"{recording.damaged - len(lost)} more damaged places")
@@ -38,6 +43,8 @@ def _note(recording: Recording, missing: int) -> str:
         lost.append(recording.torn)
     if missing:
         lost.append(f"{missing} records are missing between others")
-    return f"recovered {recording.records} records from {recording.path.name}; " + (
+    if again:
+        lost.append(f"{again} records came again or too late and are left out")
+    return f"recovered {recording.records - again} records from {recording.path.name}; " + (
         "; ".join(lost) or "nothing was lost"
     )

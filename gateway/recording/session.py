@@ -84,25 +84,22 @@ def metadata_of(path: Path) -> dict[str, str]:
     return reader.metadata
 
 
-def beginnings(files: Iterable[Path]) -> list[Path]:
-    """Those of some files that do not go on with a session, in order."""
-    return sorted(file for file in files if not _FOLLOWER.fullmatch(file.stem))
+def sessions(files: Iterable[Path]) -> list[list[Path]]:
+    """Files by the session that they belong to as their names say, each session's in order, whether it is all there."""
+    found: dict[Path, list[tuple[int, Path]]] = {}
+    for file in files:
+        match = _FOLLOWER.fullmatch(file.stem)
+        first = file.with_name(f"{match[1]}{file.suffix}") if match else file
+        found.setdefault(first, []).append((int(match[2]) if match else 1, file))
+    return [[file for _, file in sorted(group)] for _, group in sorted(found.items())]
 
 
 def _files(path: Path) -> list[Path]:
     if not path.is_dir():
-        return [path, *_followers(path)]
-    firsts = beginnings(path.glob("*.mcap"))
-    if len(firsts) != 1:
-        found = ", ".join(file.name for file in firsts) or "none"
-        raise GatewayError(f"{path} is a directory with {len(firsts)} recordings: name one ({found})")
-    return [firsts[0], *_followers(firsts[0])]
-
-
-def _followers(first: Path) -> list[Path]:
-    found: list[tuple[int, Path]] = []
-    for path in first.parent.glob(f"*{first.suffix}"):
-        match = _FOLLOWER.fullmatch(path.stem)
-        if match and match[1] == first.stem:
-            found.append((int(match[2]), path))
-    return [path for _, path in sorted(found)]
+        beside = sessions(path.parent.glob(f"*{path.suffix}"))
+        return next((session for session in beside if session[0] == path), [path])
+    found = sessions(path.glob("*.mcap"))
+    if len(found) != 1:
+        names = ", ".join(session[0].name for session in found) or "none"
+        raise GatewayError(f"{path} is a directory with {len(found)} recordings: name one ({names})")
+    return found[0]

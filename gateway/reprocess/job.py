@@ -18,7 +18,7 @@ from gateway.exports.parquet import VERDICTS
 from gateway.metadata import build_monitor, recorded_config, recorded_monitor
 from gateway.pipeline import Pipeline
 from gateway.recording import Recording
-from gateway.recording.session import beginnings
+from gateway.recording.session import sessions
 from monitor.integrity import Monitor
 
 RECORDS_AT_ONCE = 1024
@@ -106,7 +106,14 @@ def work(job: Job) -> Outcome:
 
 def _set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
     """How a recording is to be read and judged."""
-    config = RackConfig.model_validate_json(job.config) if job.config else recorded_config(recording.metadata)
+    recorded = recorded_config(recording.metadata)
+    config = RackConfig.model_validate_json(job.config) if job.config else recorded
+    names, given = ({adapter.name for adapter in one.adapters} for one in (recorded, config))
+    if not names & given:
+        raise GatewayError(
+            f"{job.path} was recorded from {', '.join(sorted(names))}, and the rack file names none of them: "
+            f"give one of its adapters ({', '.join(sorted(given))}) that name"
+        )
     files = [(path, path.stat().st_mtime_ns) for path in job.terrain or config.terrain if path.exists()]
     made_with = tuple((name, recording.metadata[name]) for name in MADE_WITH if name in recording.metadata)
     return _made(job.config, job.terrain, made_with, tuple(files))
@@ -146,7 +153,7 @@ def code_version() -> str:
 
 def jobs(directory: Path, config: RackConfig | None, terrain: Iterable[Path]) -> list[Job]:
     """A job for each recording below a directory. Raises GatewayError if there is none."""
-    paths = beginnings(directory.rglob("*.mcap"))
+    paths = [session[0] for session in sessions(directory.rglob("*.mcap"))]
     if not paths:
         raise GatewayError(f"{directory} holds no recordings (*.mcap): name the directory that they are in")
     written = json.dumps(config.model_dump(mode="json")) if config else ""

@@ -7,7 +7,7 @@ from simulators.outlets.base import Closing
 
 
 class FileOutlet(Closing):
-    """The stream as a file, made anew when the first packet is there to be written."""
+    """The stream as a new file, made when the first packet is there to be written, or down a device such as /dev/null."""
 
     def __init__(self, path: Path) -> None:
         self.place = ""
@@ -15,8 +15,9 @@ class FileOutlet(Closing):
         self._file: BufferedWriter | None = None
 
     def write(self, data: bytes) -> None:
-        """Append to the file; raises OSError when it cannot."""
-        self._file = self._file or self._path.open("wb")
+        """Append to the file; raises OSError when it cannot, or when something has its name already."""
+        if self._file is None:
+            self._file = self._path.open("wb" if self._path.is_char_device() else "xb")
         self._file.write(data)
 
     def close(self) -> None:

@@ -1,5 +1,7 @@
 """Outlets by the names that `simulate --to` takes."""
 
+import ipaddress
+import socket
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -35,7 +37,8 @@ def named(text: str) -> Way:
             return Way(FileOutlet(Path(address)), carriers.stream())
         case "udp" if ":" in address:
             host, _, port = address.rpartition(":")
-            return Way(UdpOutlet(host, _port(port)), carriers.datagram())
+            number = _port(port)
+            return Way(UdpOutlet(_here(host), number), carriers.datagram())
         case "slcan" if not address:
             return Way(SlcanOutlet(), carriers.slcan(fd))
         case "can" if ":" in address:
@@ -52,6 +55,14 @@ def _link(text: str) -> Path | None:
     if link and link.exists() and not link.is_symlink():
         raise ValueError(f"{link} is there already and no link of ours: choose another name")
     return link
+
+
+def _here(host: str) -> str:
+    """A host that is this machine: a simulated bridge must not be taken for a real one on somebody's network."""
+    address = socket.getaddrinfo(host.strip("[]"), None)[0][4][0]
+    if not ipaddress.ip_address(address).is_loopback:
+        raise ValueError(f"{host} is another machine: a simulation is sent to this one alone, such as 127.0.0.1")
+    return host
 
 
 def _port(text: str) -> int:

@@ -135,6 +135,23 @@ def test_a_bad_type_or_count_costs_its_own_bytes_alone(damage: bytes) -> None:
     assert (reader.bad_records, reader.skipped) == (1, len(damage))
 
 
+@pytest.mark.parametrize("place", range(20))
+def test_a_byte_that_is_lost_costs_its_record_alone(place: int) -> None:
+    reader = framer("seqrecord")
+    torn = BALLARD_429[:place] + BALLARD_429[place + 1 :]
+    (packet,) = reader.feed(BALLARD_429 + torn + 3 * BALLARD_429)
+    assert words429(packet).words.tolist() == [0xE00190A1] * 4
+    assert reader.skipped == 19
+
+
+def test_what_looks_like_a_record_of_another_bus_swallows_no_word_behind_it() -> None:
+    reader = framer("seqrecord")
+    like = struct.pack("<HH", 0x0103, 40) + bytes(20)  # 80 bytes, says the count
+    (packet,) = reader.feed(BALLARD_429 + like + 5 * BALLARD_429)
+    assert len(words429(packet).words) == 6
+    assert (reader.foreign_records, reader.bad_records) == (0, 1)
+
+
 def test_a_max_technologies_word_has_its_time_and_tells_of_repetitions() -> None:
     reader = framer("mxf429", 7)
     (packet,) = reader.feed(MAX_429)

@@ -137,6 +137,13 @@ def test_one_recording_that_cannot_be_worked_out_costs_no_other(flights: Path, t
     assert "is not a shadebus recording" in run.stderr
 
 
+def test_a_rack_file_that_names_no_adapter_of_the_recording_is_refused(flights: Path, tmp_path: Path) -> None:
+    (tmp_path / "rack.toml").write_text('[[adapters]]\nname = "other"\nsource = "serial:x"\n')
+    run = shadebus("reprocess", flights, "-o", tmp_path / "out", "-c", tmp_path / "rack.toml")
+    assert run.returncode == 1
+    assert "was recorded from bridge, and the rack file names none of them" in run.stderr
+
+
 def test_a_directory_without_recordings_and_a_scheduler_that_is_not_there_are_named(
     tmp_path: Path, flights: Path
 ) -> None:

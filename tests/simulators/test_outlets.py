@@ -171,6 +171,19 @@ def test_a_name_without_an_outlet_is_refused_with_what_there_is(name: str) -> No
         named(name)
 
 
+@pytest.mark.parametrize("host", ["8.8.8.8", "192.168.1.7", "0.0.0.0", "[2001:db8::1]"])
+def test_traffic_for_another_machine_is_refused(host: str) -> None:
+    with pytest.raises(ValueError, match="is another machine"):
+        named(f"udp:{host}:9")
+
+
+def test_a_file_that_is_there_already_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / "kept").write_bytes(b"kept")
+    with FileOutlet(tmp_path / "kept") as outlet, pytest.raises(FileExistsError):
+        outlet.write(b"new")
+    assert (tmp_path / "kept").read_bytes() == b"kept"
+
+
 def test_a_tcp_client_gets_every_byte_and_then_the_end() -> None:
     received = bytearray()
     with TcpOutlet() as outlet:

@@ -120,6 +120,38 @@ def test_what_damage_cost_is_in_the_note(tmp_path: Path) -> None:
     assert "of a.mcap: the CRC of a raw chunk is wrong; 1 records are missing between others" in said
 
 
+def test_records_that_come_again_are_recovered_once_and_the_result_is_sound(tmp_path: Path) -> None:
+    once = [raw(k, k, b"x") if k % 2 else tick(k, k) for k in range(8)]
+    recording = Recording(made(tmp_path / "a.mcap", [*once[:6], *once[2:6], *once[6:]]))
+    said = recover(recording, iter(recording), tmp_path / "b.mcap")
+    assert "recovered 8 records from a.mcap; 4 records came again or too late and are left out" in said
+    whole = Recording(tmp_path / "b.mcap")
+    assert list(whole)[:-1] == once
+    assert verify(whole).problems == []
+
+
+def test_a_sequence_that_nothing_vouches_for_leaves_no_record_out(tmp_path: Path) -> None:
+    recording = Recording(made(tmp_path / "a.mcap", [raw(0, 0, b"x"), tick(900, 1), raw(2, 2, b"y")]))
+    recover(recording, iter(recording), tmp_path / "b.mcap")
+    assert [record.sequence for record in Recording(tmp_path / "b.mcap")][:3] == [0, 900, 2]
+
+
+def test_of_several_recordings_each_is_verified_whatever_the_others_are(tmp_path: Path) -> None:
+    good = made(tmp_path / "a.mcap", [tick(0, 0)])
+    done = shadebus("verify", tmp_path / "none.mcap", good)
+    assert done.returncode == 1
+    assert f"{tmp_path / 'none.mcap'}: NOT sound: cannot read" in done.stdout
+    assert f"{good}: 1 records in 1 files: sound" in done.stdout
+
+
+def test_a_session_whose_first_file_is_gone_is_read_from_the_next_on(tmp_path: Path) -> None:
+    for number, name in ((2, "a.0002.mcap"), (3, "a.0003.mcap")):
+        recorder = Recorder(tmp_path / name, {"session": "a", "file": str(number)})
+        recorder.append([tick(number, number)])
+        recorder.close()
+    assert [record.sequence for record in Recording(tmp_path)] == [2, 3]
+
+
 def test_a_session_is_recovered_as_one_file(tmp_path: Path) -> None:
     for number, name in ((1, "a.mcap"), (2, "a.0002.mcap")):
         Recorder(tmp_path / name, {"session": "a", "file": str(number)}).append([tick(number - 1, number)])
