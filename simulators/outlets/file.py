@@ -7,7 +7,7 @@ from simulators.outlets.base import Closing
 
 
 class FileOutlet(Closing):
-    """The stream as a new file, made when the first packet is there to be written, or down a device such as /dev/null."""
+    """The stream as a new file, made when the first packet is there to be written, or into a device."""
 
     def __init__(self, path: Path) -> None:
         self.place = ""
