@@ -150,7 +150,10 @@ def run(line: Line, faults: list[str], place: Path) -> list[Bridge]:
                 thread.start()
             for thread in threads:
                 thread.join()
-            wait_until(lambda: len(live.events("state")) > SECONDS, "the last words are heard")
+            for outlet in outlets:
+                getattr(outlet, "drain", lambda: None)()  # or a slow reader would be stopped before the last words
+            enough = max(SECONDS, len(live.events("state")) + 1)
+            wait_until(lambda: len(live.events("state")) > enough, "the last words are heard")
         (summary,) = live.events("summary")
         for bridge in bridges:
             prefix = f"{bridge.fault.name}."
