@@ -2,7 +2,7 @@
 
 A packet is plain if it carries words of a channel in use, follows the one before of its bridge without a gap or a flag,
 cannot end a sweep, and has room among the words that wait. What is done with plain packets here is what
-`gateway.pipeline` does with any packet one by one, which all others are left to.
+`gateway.listening` does with any packet one by one, which all others are left to.
 """
 
 from collections.abc import Sequence
@@ -84,7 +84,7 @@ def framed(links: Sequence[Link], records: Sequence[Raw]) -> Batch:
 
 
 @njit(cache=True)
-def count_plain(  # type: ignore[no-untyped-def] # typed by Pipeline
+def count_plain(  # type: ignore[no-untyped-def] # typed by Listener
     header, start, size, data, link, host_ns, kind, end_ns, until_ns, sequence, latest_ns, clocks, reference, last,
     radar_bits, room, offset_ns,
 ):  # fmt: skip

@@ -67,7 +67,7 @@ class Steps:
             return
         line = sys.stdin.fileno()
         if os.isatty(line):
-            print("Enter for the next scan", file=sys.stderr, end="  ", flush=True)  # noqa: T201
+            print("Enter for the next scan", file=sys.stderr, end="  ", flush=True)  # noqa: T201 # asks its user
         while b"\n" not in self._rest and not self._ended and not stop.is_set():
             if select.select([line], [], [], POLL_S)[0]:
                 some = os.read(line, LARGEST_READ)
