@@ -3,6 +3,7 @@
 Every word of the right length becomes a radial, whatever its label, range or gain code: nothing is dropped here.
 """
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Final
 
@@ -10,15 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from decoders import formats as f
-from decoders import kernels708
+from decoders import kernels708, kernels708_bins
 from decoders.profiles import Profile, ProfileError, load_profile
 from decoders.results708 import Header, Meanings, Radials
 
 __all__ = ["Header", "Profile", "ProfileError", "Radials", "headers", "load_profile", "misread_bits", "unpack"]
 
-CODES: Final = np.arange(64)
-GAIN_DB: Final = np.where(f.GAIN_CALIBRATED == CODES, np.nan, CODES * f.GAIN_LSB_DB + 0.0)  # so that 0 is not -0
-RANGE_NM: Final = np.where(CODES == 0, f.RANGE_CODE_ZERO_NM, CODES * float(f.RANGE_LSB_NM))
 HALF_TURN: Final = 2048  # codes of the scan angle
 RESERVED: Final = "reserved"  # the name of a mode or level without a meaning
 NO_LEVEL: Final = 255
@@ -42,7 +40,7 @@ def unpack(words: npt.ArrayLike, profile: str | Profile = "arinc708") -> Radials
     header = _headers(array, meanings)
     bins = np.empty((len(array), settings.bins), np.uint8)
     for level in reserved_levels:
-        kernels708.unpack_bins(array, settings.bits_per_bin, level, bins, header.unusual)
+        kernels708_bins.unpack_bins(array, settings.bits_per_bin, level, bins, header.unusual)
     return Radials(*header[:-1], bins, header.unusual)
 
 
@@ -81,21 +79,18 @@ def _headers(array: npt.NDArray[np.uint8], meanings: Meanings) -> Header:
 
 @cache
 def _meanings(settings: Profile) -> tuple[Meanings, list[int]]:
-    """What the kernels need of a profile: tables, and the levels to flag, or one that no bin has."""
+    """What the kernels need of a profile, and the levels to flag, or one that no bin has."""
     meanings = Meanings(
-        gain_db=GAIN_DB,
-        range_nm=RANGE_NM,
-        unusual_label=_flagged("unknown_label", ~np.isin(np.arange(256), settings.labels)),
-        unusual_mode=_flagged("reserved_mode", np.array(settings.modes) == RESERVED),
+        labels=np.array(settings.labels, np.uint8),
+        reserved_modes=_reserved(settings.modes),
         scan_angle_zero=HALF_TURN if settings.scan_angle_zero == "tail" else 0,
         scan_angle_sense=1 if settings.scan_angle_sense == "clockwise" else -1,
     )
-    reserved = [level for level, name in enumerate(settings.levels) if name == RESERVED]
-    return meanings, reserved or [NO_LEVEL]
+    return meanings, _reserved(settings.levels).tolist() or [NO_LEVEL]
 
 
-def _flagged(name: str, unusual: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
-    return np.where(unusual, np.uint8(1 << f.UNUSUAL_708.index(name)), np.uint8(0))
+def _reserved(names: Sequence[str]) -> npt.NDArray[np.uint8]:
+    return np.array([code for code, name in enumerate(names) if name == RESERVED], np.uint8)
 
 
 def _words(words: npt.ArrayLike) -> npt.NDArray[np.uint8]:
@@ -106,5 +101,4 @@ def _words(words: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         )
     if array.dtype != np.uint8:
         raise ValueError(f"words of type {array.dtype}: pass bytes, uint8")
-    # One memory layout, so that the kernels are compiled once.
-    return np.require(array, np.uint8, ["C", "A", "W"])
+    return array if array.flags.carray else array.copy()  # one memory layout, so that the kernels are compiled once

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 from decoders import formats as f
-from decoders.arinc708 import GAIN_DB, RANGE_NM
+from decoders import kernels708
 from decoders.definitions import Definition, DefinitionError, Definitions
 
 WIDTHS: Final = {"mode": 3, "tilt": 7, "gain": 6, "range": 6}  # as in the radar's header; all else is one bit
@@ -41,8 +41,8 @@ READ: Final[dict[str, tuple[str, Callable[[int], float]]]] = {
     "stabilised": ("stabilised", bool),
     "mode": ("mode", int),
     "tilt": ("tilt_deg", _tilt_deg),
-    "gain": ("gain_db", lambda code: float(GAIN_DB[code])),
-    "range": ("range_nm", lambda code: float(RANGE_NM[code])),
+    "gain": ("gain_db", kernels708.gain_db),
+    "range": ("range_nm", kernels708.range_nm),
     "vertical_profile": ("vertical_profile", bool),
 }
 

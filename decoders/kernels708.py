@@ -1,4 +1,4 @@
-"""The loops over ARINC 708 words, compiled; `decoders.arinc708` says what the codes mean and checks the arguments.
+"""The loops over the headers of ARINC 708 words, compiled; `decoders.arinc708` checks the arguments.
 
 Numba freezes module constants into its cache, so what a profile may change comes as arguments.
 """
@@ -7,10 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from llvmlite import ir
-from numba import njit, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba import njit
 
 from decoders import formats as f
 from decoders.results708 import Header, Meanings
@@ -19,6 +16,7 @@ Int = int | np.int64
 Array = npt.NDArray[Any]
 Bytes = npt.NDArray[np.uint8]
 Place = tuple[int, int]
+Parts = tuple[Array, Array, Array]
 
 HEADER_BYTES: Final = f.HEADER_708_BYTES
 LABEL: Final = f.HEADER_708["label"]
@@ -34,22 +32,28 @@ RANGE: Final = f.HEADER_708["range"]
 DATA_ACCEPT: Final = f.HEADER_708["data_accept"]
 SCAN_ANGLE: Final = f.HEADER_708["scan_angle"]
 SPARES: Final = tuple(f.SPARE_708.values())
+UNKNOWN_LABEL: Final = f.UNUSUAL_708.index("unknown_label")
+RESERVED_MODE: Final = f.UNUSUAL_708.index("reserved_mode")
 FIRST_SPARE: Final = f.UNUSUAL_708.index(next(iter(f.SPARE_708)))
-RESERVED_LEVEL: Final = 1 << f.UNUSUAL_708.index("reserved_level")
 TILT_LSB_DEG: Final = f.TILT_LSB_DEG
 SCAN_ANGLE_LSB_DEG: Final = f.SCAN_ANGLE_LSB_DEG
-BYTES_AT_ONCE: Final = 12  # of the wire: 32 bins of 3 bits or 16 of 6
-LOADED: Final = 16  # bytes for half of them, with some before: one register
-WORDS_AT_ONCE: Final = 1024  # headers that stay in the nearest cache while each field passes over them
+GAIN_LSB_DB: Final = f.GAIN_LSB_DB
+GAIN_CALIBRATED: Final = f.GAIN_CALIBRATED
+RANGE_LSB_NM: Final = float(f.RANGE_LSB_NM)
+RANGE_CODE_ZERO_NM: Final = float(f.RANGE_CODE_ZERO_NM)
+WORDS_AT_ONCE: Final = 2000  # headers that stay in the nearest cache while each field passes over them
+PART_BITS: Final = 16  # A header is cut into 32 bits from bit 0, 16 and 32: every field lies within one of them,
+PARTS: Final = 3  # and of numbers of 32 bits a register holds twice as many as of whole headers.
 
 
 @njit(cache=True)
 def headers(words: Bytes, meanings: Meanings, header: Header) -> None:
     """Fill the header fields of each word. One loop a field: the compiler makes vectors of such loops only."""
-    buffer = np.empty(WORDS_AT_ONCE, np.int64)
+    low, middle, high = _room(), _room(), _room()
     for first in range(0, words.shape[0], WORDS_AT_ONCE):
         end = min(first + WORDS_AT_ONCE, words.shape[0])
-        bits = buffer[: end - first]
+        bits = low[: end - first], middle[: end - first], high[: end - first]
+        unusual = header.unusual[first:end]
         _load(words[first:end], bits)
         _label(bits, header.label[first:end])
         _code(bits, CONTROL_ACCEPT, header.control_accept[first:end])
@@ -59,143 +63,123 @@ def headers(words: Bytes, meanings: Meanings, header: Header) -> None:
         _flag(bits, STABILISED, header.stabilised[first:end])
         _code(bits, MODE, header.mode[first:end])
         _angle(bits, TILT, 0, 1, TILT_LSB_DEG, header.tilt_deg[first:end])
-        _look_up(bits, GAIN, meanings.gain_db, header.gain_db[first:end])
-        _look_up(bits, RANGE, meanings.range_nm, header.range_nm[first:end])
+        _gain(bits, header.gain_db[first:end])
+        _range(bits, header.range_nm[first:end])
         _code(bits, DATA_ACCEPT, header.data_accept[first:end])
         zero, sense = meanings.scan_angle_zero, meanings.scan_angle_sense
         _angle(bits, SCAN_ANGLE, zero, sense, SCAN_ANGLE_LSB_DEG, header.scan_angle_deg[first:end])
-        _unusual(header.label[first:end], header.mode[first:end], meanings, header.unusual[first:end])
-        _spares(bits, header.unusual[first:end])
+        _unexpected(header.label[first:end], meanings.labels, UNKNOWN_LABEL, unusual)
+        _reserved(header.mode[first:end], meanings.reserved_modes, RESERVED_MODE, unusual)
+        _spares(bits, unusual)
 
 
 @njit(cache=True)
-def unpack_bins(words: Bytes, bits_per_bin: int, reserved_level: int, bins: Bytes, unusual: Bytes) -> None:
-    """Fill the bins of each word, 32 or more of 3 or 6 bits, and flag the words that hold a reserved level."""
-    level = np.uint8(reserved_level)
+def gain_db(code: Int) -> float:
+    """0 is maximum gain, nan calibrated."""
+    return np.nan if code == GAIN_CALIBRATED else np.int32(code) * GAIN_LSB_DB + 0.0  # so that 0 is not -0
+
+
+@njit(cache=True)
+def range_nm(code: Int) -> float:
+    """5 to 320."""
+    return RANGE_CODE_ZERO_NM if code == 0 else np.int32(code) * RANGE_LSB_NM
+
+
+@njit(cache=True)
+def _room() -> Array:
+    return np.empty(WORDS_AT_ONCE, np.int32)
+
+
+@njit(cache=True)
+def _load(words: Bytes, bits: Parts) -> None:
     for i in range(words.shape[0]):
-        word, row = words[i], bins[i]
-        found = _spread(3, word, row, level) if bits_per_bin == 3 else _spread(6, word, row, level)
-        unusual[i] |= found * RESERVED_LEVEL
-
-
-@njit(cache=True)
-def _load(words: Bytes, bits: Array) -> None:
-    for i in range(bits.size):
         header = np.int64(0)
         for place in range(HEADER_BYTES):
             header |= np.int64(words[i, place]) << (8 * place)
-        bits[i] = header
+        for part in range(PARTS):
+            bits[part][i] = header >> (PART_BITS * part)
 
 
 @njit(cache=True)
-def _field(bits: Int, place: Place) -> Int:
-    return (bits >> place[0]) & ((1 << place[1]) - 1)
+def _place(bits: Parts, place: Place) -> tuple[Array, np.int32, np.int32]:
+    """Where a field is: the part of the header it lies in, how far from its foot, and a mask of its width."""
+    part = min(place[0] // PART_BITS, PARTS - 1)
+    return bits[part], np.int32(place[0] - PART_BITS * part), np.int32((1 << place[1]) - 1)
 
 
 @njit(cache=True)
-def _code(bits: Array, place: Place, codes: Array) -> None:
+def _code(bits: Parts, place: Place, codes: Array) -> None:
+    part, shift, mask = _place(bits, place)
     for i in range(codes.size):
-        codes[i] = _field(bits[i], place)
+        codes[i] = (part[i] >> shift) & mask
 
 
 @njit(cache=True)
-def _flag(bits: Array, place: Place, flags: Array) -> None:
+def _flag(bits: Parts, place: Place, flags: Array) -> None:
+    part, shift, mask = _place(bits, place)
     for i in range(flags.size):
-        flags[i] = _field(bits[i], place) != 0
+        flags[i] = ((part[i] >> shift) & mask) != 0
 
 
 @njit(cache=True)
-def _look_up(bits: Array, place: Place, table: Array, values: Array) -> None:
+def _gain(bits: Parts, values: Array) -> None:
+    part, shift, mask = _place(bits, GAIN)
     for i in range(values.size):
-        values[i] = table[_field(bits[i], place)]
+        values[i] = gain_db((part[i] >> shift) & mask)
 
 
 @njit(cache=True)
-def _angle(bits: Array, place: Place, zero: int, sense: int, lsb_deg: float, values: Array) -> None:
-    width = place[1]
+def _range(bits: Parts, values: Array) -> None:
+    part, shift, mask = _place(bits, RANGE)
     for i in range(values.size):
-        code = (zero + sense * _field(bits[i], place)) & ((1 << width) - 1)
-        values[i] = np.int32(code - ((code >> (width - 1)) << width)) * lsb_deg  # 32 bits become floats at once
+        values[i] = range_nm((part[i] >> shift) & mask)
 
 
 @njit(cache=True)
-def _label(bits: Array, labels: Array) -> None:
+def _angle(bits: Parts, place: Place, zero: int, sense: int, lsb_deg: float, values: Array) -> None:
+    part, shift, _ = _place(bits, place)
+    first, sign, above = np.int32(zero), np.int32(sense), np.int32(32 - place[1])
+    for i in range(values.size):
+        code = np.int32(first + sign * (part[i] >> shift))
+        values[i] = np.int32(np.int32(code << above) >> above) * lsb_deg  # the shift back up repeats the sign
+
+
+@njit(cache=True)
+def _label(bits: Parts, labels: Array) -> None:
     # The label alone is sent most significant bit first.
+    part, shift, mask = _place(bits, LABEL)
     for i in range(labels.size):
-        label = _field(bits[i], LABEL)
+        label = (part[i] >> shift) & mask
         label = (label & 0x0F) << 4 | label >> 4
         label = (label & 0x33) << 2 | (label >> 2) & 0x33
         labels[i] = (label & 0x55) << 1 | (label >> 1) & 0x55
 
 
 @njit(cache=True)
-def _unusual(labels: Array, modes: Array, meanings: Meanings, unusual: Array) -> None:
-    for i in range(unusual.size):
-        unusual[i] = meanings.unusual_label[labels[i]] | meanings.unusual_mode[modes[i]]
+def _unexpected(codes: Array, expected: Array, flag: int, unusual: Array) -> None:
+    unusual[:] = 1 << flag
+    for k in range(expected.size):
+        code = expected[k]
+        for i in range(codes.size):
+            unusual[i] = np.uint8(unusual[i] * np.uint8(codes[i] != code))
 
 
 @njit(cache=True)
-def _spares(bits: Array, unusual: Array) -> None:
+def _reserved(codes: Array, reserved: Array, flag: int, unusual: Array) -> None:
+    for k in range(reserved.size):
+        code = reserved[k]
+        for i in range(codes.size):
+            unusual[i] = np.uint8(unusual[i] | np.uint8(codes[i] == code) << flag)
+
+
+@njit(cache=True)
+def _spares(bits: Parts, unusual: Array) -> None:
+    part0, shift0, mask0 = _place(bits, SPARES[0])
+    part1, shift1, mask1 = _place(bits, SPARES[1])
+    part2, shift2, mask2 = _place(bits, SPARES[2])
+    flag0, flag1, flag2 = np.int32(FIRST_SPARE), np.int32(FIRST_SPARE + 1), np.int32(FIRST_SPARE + 2)
     for i in range(unusual.size):
-        for k in range(len(SPARES)):
-            unusual[i] |= (_field(bits[i], SPARES[k]) != 0) << (FIRST_SPARE + k)
-
-
-def _spread_word(_context: Any, width: Any, word: Any, bins: Any, level: Any) -> Any:
-    """Bins of `width` bits, 3 or 6, from a word, one a byte; whether any of them is `level`.
-
-    A step takes 12 bytes, as two halves of 6. Each pair of bins lies in two neighbouring bytes and ends in the second:
-    shuffle those into a 16-bit lane, shift the pair to its foot, and fill the upper byte from the pair moved up until
-    its second bin stands there. The compiler finds no shuffle in a loop, which takes twice as long.
-    """
-    bits = width.literal_value
-    at_once = BYTES_AT_ONCE * 8 // bits
-    upper = [(2 * bits * (pair + 1) - 1) // 8 for pair in range(at_once // 2)]  # the byte where each pair ends
-    shift = [2 * bits * pair - 8 * (byte - 1) for pair, byte in enumerate(upper)]
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        source, target = (context.make_array(signature.args[k])(context, builder, arguments[k]) for k in (1, 2))
-        length = builder.extract_value(target.shape, 0)
-        i8, i16, i32, count = ir.IntType(8), ir.IntType(16), ir.IntType(32), length.type
-        loaded, lanes, spread = ir.VectorType(i8, LOADED), ir.VectorType(i16, at_once // 2), ir.VectorType(i8, at_once)
-        found = cgutils.alloca_once(builder, spread)  # type: ignore[no-untyped-call] # numba leaves it so
-        builder.store(ir.Constant(spread, None), found)
-        one = builder.insert_element(ir.Constant(spread, ir.Undefined), arguments[3], i32(0))
-        every = _shuffled(builder, one, one, [0] * at_once)
-        # Where a byte is in both halves once they are loaded, the first from the start of the word, the other 4 on.
-        half = len(upper) // 2
-        pick = [byte + k + (HEADER_BYTES if n < half else LOADED + 4) for n, byte in enumerate(upper) for k in (-1, 0)]
-
-        def step(byte: Any, first: Any) -> None:
-            start = builder.gep(source.data, [byte])
-            places = (start, builder.gep(start, [count(4)]))
-            low, high = (builder.load(builder.bitcast(place, loaded.as_pointer()), align=1) for place in places)
-            pairs = builder.bitcast(_shuffled(builder, low, high, pick), lanes)
-            near = builder.lshr(pairs, ir.Constant(lanes, shift))
-            far = builder.shl(near, ir.Constant(lanes, [8 - bits] * len(shift)))
-            upper_from_far = [k + at_once * (k % 2) for k in range(at_once)]
-            both = _shuffled(builder, builder.bitcast(near, spread), builder.bitcast(far, spread), upper_from_far)
-            result = builder.and_(both, ir.Constant(spread, [2**bits - 1] * at_once))
-            place = builder.bitcast(builder.gep(target.data, [first]), spread.as_pointer())
-            builder.store(result, place, align=1)
-            equal = builder.sext(builder.icmp_unsigned("==", result, every), spread)
-            builder.store(builder.or_(builder.load(found), equal), found)
-
-        steps = builder.udiv(length, count(at_once))
-        with cgutils.for_range(builder, steps) as loop:
-            step(builder.mul(loop.index, count(BYTES_AT_ONCE)), builder.mul(loop.index, count(at_once)))
-        with builder.if_then(builder.icmp_unsigned("!=", builder.mul(steps, count(at_once)), length)):
-            last = builder.sub(length, count(at_once))  # the last ones reach back
-            step(builder.udiv(builder.mul(last, count(bits)), count(8)), last)
-        whole = builder.bitcast(builder.load(found), ir.IntType(8 * at_once))
-        return builder.zext(builder.icmp_unsigned("!=", whole, whole.type(0)), i8)
-
-    return types.uint8(width, word, bins, level), generate
-
-
-def _shuffled(builder: Any, one: Any, other: Any, pick: list[int]) -> Any:
-    """A vector of the elements of two others that `pick` names."""
-    return builder.shuffle_vector(one, other, ir.Constant(ir.VectorType(ir.IntType(32), len(pick)), pick))
-
-
-_spread: Any = intrinsic(prefer_literal=True)(_spread_word)
+        flags = np.int32((part0[i] >> shift0) & mask0 != 0) << flag0
+        flags |= np.int32((part1[i] >> shift1) & mask1 != 0) << flag1
+        flags |= np.int32((part2[i] >> shift2) & mask2 != 0) << flag2
+        unusual[i] |= flags

@@ -63,11 +63,9 @@ class Radials(NamedTuple):
 
 
 class Meanings(NamedTuple):
-    """A profile as the kernel of the header reads it: tables by code."""
+    """A profile as the kernel of the header reads it."""
 
-    gain_db: npt.NDArray[np.float64]  # (64,)
-    range_nm: npt.NDArray[np.float64]  # (64,)
-    unusual_label: npt.NDArray[np.uint8]  # (256,) 0, or the bit of `unusual`
-    unusual_mode: npt.NDArray[np.uint8]  # (8,) 0, or the bit of `unusual`
+    labels: npt.NDArray[np.uint8]  # that are expected
+    reserved_modes: npt.NDArray[np.uint8]  # codes
     scan_angle_zero: int  # code of the nose's opposite, 2048, if the radar counts from the tail, else 0
     scan_angle_sense: int  # 1 clockwise, -1 counterclockwise
