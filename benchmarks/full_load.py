@@ -28,7 +28,7 @@ from gateway.config import RackConfig, check_config
 from gateway.events import Event, ScanEvent, SummaryEvent
 from gateway.metadata import build_monitor
 from gateway.service import Service
-from monitor.aircraft import AXES, SOURCES
+from monitor.quantities import AXES, SOURCES
 from simulators import arinc429, bridge, carriers, racklink
 from simulators.ledger import Ledger
 from simulators.outlets import PtyOutlet, UdpOutlet

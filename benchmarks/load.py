@@ -16,7 +16,7 @@ from gateway.events import IntegrityEvent
 from gateway.metadata import build_monitor
 from gateway.pipeline import Pipeline
 from gateway.records import Raw, Stamp
-from monitor.aircraft import AXES, SOURCES
+from monitor.quantities import AXES, SOURCES
 from simulators import arinc429, racklink
 from simulators.link import whole_stream
 from simulators.scenario import BUILT_IN_TERRAIN, Radar, Scenario, white_mountains

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decoders.definitions import DefinitionError, Definitions
-from monitor.aircraft import GNSS, GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE, Aircraft, status_name
+from monitor.aircraft import Aircraft, status_name
 from monitor.geodesy import NM_M
+from monitor.quantities import GNSS, GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE
 
 MODE_LABEL, MODE_BITS = 0o273, 5
 # Bits 28 to 26 of label 273; bits 25 and 24 only tell kinds of navigation apart.

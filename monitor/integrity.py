@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from decoders.arinc708 import misread_bits
 from decoders.formats import MODES_708
-from monitor import aircraft as state
+from monitor import quantities as state
 from monitor.aircraft import Aircraft, status_name
 from monitor.calibration import NO_CALIBRATION, Calibration, uncalibrated
 from monitor.disparity import (

@@ -8,7 +8,7 @@ noise many times over: it is taken over a fair part of `longest_gap_s`, and wher
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numba import njit
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 NORMAL, STALE, MISSING = 0, 254, 255  # bus statuses of ARINC 429 words lie between
 NS = 1e-9
+CAPACITY = 4096  # samples of a quantity
 SHORTEST_SLOPE = 0.05  # of longest_gap_s, so that the noise of a sample grows 20 times at most
 
 
@@ -44,30 +45,33 @@ def wrap(angle_deg: NDArray[np.float64]) -> NDArray[np.float64]:
     return (angle_deg + 180) % 360 - 180
 
 
-class Track:
-    """The last `capacity` samples of one quantity, in order of time."""
+class Samples(NamedTuple):
+    """The samples of m quantities in order of time, each a row, of which the first `end` are filled."""
 
-    def __init__(self, quantity: Quantity, capacity: int = 4096) -> None:
+    time_ns: NDArray[np.int64]  # (m, room)
+    value: NDArray[np.float64]
+    status: NDArray[np.uint8]
+    end: NDArray[np.int64]  # (m,)
+
+    @classmethod
+    def empty(cls, m: int, capacity: int = CAPACITY) -> Self:
+        """Room for the last `capacity` samples of each quantity, at least."""
+        room = m, 2 * capacity
+        return cls(np.empty(room, np.int64), np.empty(room), np.empty(room, np.uint8), np.zeros(m, np.int64))
+
+
+class Track:
+    """The last samples of one quantity: its row of `samples`, or samples of its own."""
+
+    def __init__(self, quantity: Quantity, samples: Samples | None = None, row: int = 0) -> None:
         self.quantity = quantity
-        self._capacity = capacity
-        self._time = np.empty(2 * capacity, np.int64)
-        self._value = np.empty(2 * capacity)
-        self._status = np.empty(2 * capacity, np.uint8)
-        self._end = 0
+        self._samples = samples or Samples.empty(1)
+        self._row = row
 
     def append(self, time_ns: NDArray[np.int64], value: NDArray[np.float64], status: NDArray[np.uint8]) -> None:
         """Add samples (n,) in order of time; a clock that stepped back forgets what it had measured before."""
-        if self._end and time_ns[0] < self._time[self._end - 1]:
-            self._end = 0
-        newest = slice(-self._capacity, None)
-        time_ns, value, status = time_ns[newest], value[newest], status[newest]
-        if self._end + len(time_ns) > 2 * self._capacity:
-            for store in (self._time, self._value, self._status):
-                store[: self._capacity] = store[self._end - self._capacity : self._end]
-            self._end = self._capacity
-        place = slice(self._end, self._end + len(time_ns))
-        self._time[place], self._value[place], self._status[place] = time_ns, value, status
-        self._end = place.stop
+        for k in range(len(time_ns)):
+            put(self._samples, self._row, time_ns[k], value[k], status[k])
 
     def at(self, time_ns: NDArray[np.int64]) -> Values:
         """The quantity at times i8 (n,): linear between two normal samples, and shortly beyond the first and the last.
@@ -75,7 +79,7 @@ class Track:
         A step is what its last sample before the time said.
         """
         found = Values(np.zeros(len(time_ns)), np.empty(len(time_ns), np.uint8))
-        samples = self._time[: self._end], self._value[: self._end], self._status[: self._end]
+        samples = [column[self._row, : self._samples.end[self._row]] for column in self._samples[:3]]
         longest_ns = round(self.quantity.longest_gap_s / NS)
         if self.quantity.step:
             _held(*samples, longest_ns, time_ns, *found)
@@ -86,9 +90,24 @@ class Track:
     @property
     def newest(self) -> tuple[int, float, int] | None:
         """Time in ns, value and status of the last sample, or None before the first."""
-        if not self._end:
-            return None
-        return int(self._time[self._end - 1]), float(self._value[self._end - 1]), int(self._status[self._end - 1])
+        times, values, statuses, ends = self._samples
+        last = self._row, int(ends[self._row]) - 1
+        return (int(times[last]), float(values[last]), int(statuses[last])) if last[1] >= 0 else None
+
+
+@njit(cache=True)
+def put(samples, row, time_ns, value, status):  # type: ignore[no-untyped-def] # typed by Samples
+    """Add a sample; a clock that stepped back forgets what it had measured before, and the oldest half makes room."""
+    times, values, statuses, ends = samples
+    end, room = ends[row], times.shape[1]
+    if end and time_ns < times[row, end - 1]:
+        end = 0
+    if end == room:
+        end = room // 2
+        times[row, :end], values[row, :end] = times[row, end:], values[row, end:]
+        statuses[row, :end] = statuses[row, end:]
+    times[row, end], values[row, end], statuses[row, end] = time_ns, value, status
+    ends[row] = end + 1
 
 
 @njit(cache=True)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from monitor import aircraft as state
+from monitor import quantities as state
 from monitor.aircraft import Aircraft
 from monitor.geodesy import body_to_enu, displace
 from monitor.scans import Scan

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from decoders.arinc429 import decode, load_definitions
-from monitor.aircraft import AXES, LATITUDE, LONGITUDE, SOURCES, Aircraft, status_name
+from monitor.aircraft import Aircraft, status_name
 from monitor.geoid import undulation_m
+from monitor.quantities import AXES, LATITUDE, LONGITUDE, SOURCES
 from monitor.track import MISSING, STALE
 from tests.decoders.bus import word429
 

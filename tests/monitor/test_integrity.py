@@ -15,10 +15,11 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, ncx2
 
 from decoders.formats import MODES_708
-from monitor.aircraft import GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE, Aircraft
+from monitor.aircraft import Aircraft
 from monitor.calibration import NO_CALIBRATION, Calibration
 from monitor.integrity import NEEDED, Comparison, Monitor, Verdict, thin
 from monitor.prediction import Beam, Pointing, predict
+from monitor.quantities import GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE
 from monitor.scans import Scan
 from monitor.settings import LeverArm, MonitorSettings
 from monitor.terrain import Terrain

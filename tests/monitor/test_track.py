@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from monitor.track import MISSING, NORMAL, STALE, Quantity, Track, Values, wrap
+from monitor.track import MISSING, NORMAL, STALE, Quantity, Samples, Track, Values, wrap
 
 NO_COMPUTED_DATA = 1
 MS = 1_000_000
@@ -119,7 +119,7 @@ def test_without_a_slope_the_value_holds(times_ms: list[int], statuses: list[int
 
 @pytest.mark.parametrize("block", [1, 3, 7, 8, 50])
 def test_a_full_buffer_keeps_the_newest_samples_whatever_the_blocks(block: int) -> None:
-    track = Track(Quantity("speed", longest_gap_s=0.15), capacity=8)
+    track = Track(Quantity("speed", longest_gap_s=0.15), Samples.empty(1, capacity=8))
     times = np.arange(50) * 100
     for first in range(0, 50, block):
         feed(track, times[first : first + block].tolist(), (times[first : first + block] / 10).tolist())
