@@ -10,6 +10,7 @@ LINK_CRC_BYTES: Final = 4  # CRC-32 of IEEE 802.3, little-endian, over header an
 LINK_MAX_BYTES: Final = 4096  # of a packet before COBS
 LINK_MAX_ENCODED_BYTES: Final = 4113  # COBS adds one byte to each begun group of 254; the closing 0x00 not counted
 LINK_MAX_WORDS: Final = 256  # ARINC 429 words of one packet
+ENTRY_429_BYTES: Final = 8  # each with its offset from the packet's time, ns u4, and the word u4
 
 HELLO: Final = 0x01
 HEARTBEAT: Final = 0x02

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from decoders import formats as f
 from decoders.definition_rows import CHARACTER_BITS
 from decoders.formats import CLOCK_DIGITS, DATE_DIGITS, SSM_BCD_MINUS, TIME_FIELDS
 from decoders.results429 import Status
@@ -35,6 +36,9 @@ SSM_STATUS: Final = 6  # and three more: the status that SSM 00, 01, 10 and 11 g
 COLUMNS: Final = 10
 
 INVALID: Final = -(2**62)  # no field of a word is that small
+ENTRY_BYTES: Final = f.ENTRY_429_BYTES  # of a packet
+MOST_WORDS: Final = f.LINK_MAX_WORDS
+EQUIPMENT: Final = 0o377  # the label that says which box sends
 NORMAL: Final = int(Status.NORMAL)
 BAD_PARITY: Final = int(Status.BAD_PARITY)
 UNKNOWN_LABEL: Final = int(Status.UNKNOWN_LABEL)
@@ -245,13 +249,14 @@ def _characters(raw: Int) -> Int:
 
 @njit(cache=True)
 def tally(  # type: ignore[no-untyped-def] # typed by health429
-    time_ns, words, label, status, has_sdi, is_known, turned, sources, first_ns, last_ns, count, ever
+    time_ns, words, label, status, has_sdi, is_known, turned, sources, first_ns, last_ns, lately, ever
 ):
     """Count decoded words in rising time by label (256,) and by source (256, 4).
 
-    Gives how many have a good parity, and of those how many have a known label, as they are and if turned round.
+    Gives how many have a good parity, and of those how many have a known label, as they are and if turned round; and
+    how many normal words say which equipment sends.
     """
-    good = known = known_if_turned = 0
+    good = known = known_if_turned = equipment = 0
     for i in range(words.size):
         of = label[i]
         if status[i] == BAD_PARITY:
@@ -261,9 +266,72 @@ def tally(  # type: ignore[no-untyped-def] # typed by health429
         good += 1
         known += is_known[of]
         known_if_turned += is_known[turned[of]]
+        equipment += of == EQUIPMENT and status[i] == NORMAL
         if not ever[of]:
             first_ns[of] = time_ns[i]
         last_ns[of] = time_ns[i]
-        count[of] += 1
+        lately[of] += 1
         ever[of] += 1
-    return good, known, known_if_turned
+    return good, known, known_if_turned, equipment
+
+
+@njit(cache=True)
+def settle(  # type: ignore[no-untyped-def] # typed by health429
+    now_ns, fast_ms, slow_ms, silent_ms, told, sources, first_ns, last_ns, lately, ever
+):
+    """End a second of tallies: labels of which there may be something to tell, and those that came from several boxes.
+
+    All others are judged: their words of this second are none of the next.
+    """
+    doubtful, shared = np.zeros(256, np.bool_), np.zeros(256, np.bool_)
+    for of in range(256):
+        shared[of] = int(sources[of, 1]) + sources[of, 2] + sources[of, 3] > 1
+        sources[of] = False
+        if not ever[of]:
+            continue
+        mean_ms = (last_ns[of] - first_ns[of]) / 1e6 / max(lately[of] - 1, 1)
+        kept = lately[of] < 2 or fast_ms[of] <= mean_ms <= slow_ms[of]
+        if told[of] or not kept or (now_ns - last_ns[of]) / 1e6 > silent_ms[of]:
+            doubtful[of] = True
+        elif lately[of] > 1:
+            first_ns[of], lately[of] = last_ns[of], 1
+    return np.flatnonzero(doubtful), np.flatnonzero(shared)
+
+
+@njit(cache=True)
+def entries(  # type: ignore[no-untyped-def] # typed by racklink.joined429
+    times_ns, offsets_ns, sizes, bodies, time_ns, sent_ns, words
+):
+    """Read the entries of packets: their words, when they were sent, and the same by the common clock.
+
+    Gives how many words there are, how many packets are malformed, and how many words of those are left out.
+    """
+    count = malformed = left_out = begin = 0
+    for packet in range(sizes.size):
+        size = int(sizes[packet])
+        whole, first, before, backwards = size // ENTRY_BYTES, count, 0, 0
+        for k in range(whole):
+            at = begin + ENTRY_BYTES * k
+            after = int(_little(bodies, at))
+            backwards += after < before
+            before = after
+            time_ns[count] = times_ns[packet] + after
+            sent_ns[count] = time_ns[count] + offsets_ns[packet]
+            words[count] = _little(bodies, at + 4)
+            count += 1
+        if backwards:
+            left_out += whole
+            count = first
+        if backwards or whole * ENTRY_BYTES != size or not 1 <= whole <= MOST_WORDS:
+            malformed += 1
+        begin += size
+    return count, malformed, left_out
+
+
+@njit(cache=True)
+def _little(data: npt.NDArray[np.uint8], at: Int) -> Int:
+    """Four bytes, the least significant first."""
+    value = np.int64(0)
+    for k in range(4):
+        value |= np.int64(data[at + k]) << (8 * k)
+    return value

@@ -17,6 +17,7 @@ from cobs import cobs
 
 from decoders import formats as f
 from decoders.framing import HEADER, Packet, PacketFramer, Packets
+from decoders.kernels429 import entries
 from decoders.kernels_link import CRC_RESIDUE, TABLES, intact
 
 __all__ = [
@@ -64,12 +65,12 @@ class TimedWords(NamedTuple):
 class Joined(NamedTuple):
     """The ARINC 429 words of many packets, those of packets that run backwards left out.
 
-    `time_ns` i8 (n,) device clock, `words` u4 (n,), `packet` i8 (n,) the index of the packet that each came in.
+    `time_ns` i8 (n,) device clock, `sent_ns` i8 (n,) the common one, `words` u4 (n,).
     """
 
     time_ns: npt.NDArray[np.int64]
+    sent_ns: npt.NDArray[np.int64]
     words: npt.NDArray[np.uint32]
-    packet: npt.NDArray[np.int64]
     malformed: int  # packets that are not 1 to 256 whole entries in order of time
     left_out: int  # words
 
@@ -259,29 +260,24 @@ def words429(packet: Packet) -> TimedWords:
     if packet.time_ns > TIME_LIMIT_NS:
         raise MalformedBody(f"device time {packet.time_ns} ns does not fit a signed 64-bit count")
     count, leftover = divmod(len(packet.body), ENTRY_429.itemsize)
-    entries = np.frombuffer(packet.body, ENTRY_429, count)
-    time_ns = entries["offset_ns"] + np.int64(packet.time_ns)
-    return TimedWords(time_ns, entries["word"], leftover, leftover == 0 and 1 <= count <= f.LINK_MAX_WORDS)
+    pairs = np.frombuffer(packet.body, ENTRY_429, count)
+    time_ns = pairs["offset_ns"] + np.int64(packet.time_ns)
+    return TimedWords(time_ns, pairs["word"], leftover, leftover == 0 and 1 <= count <= f.LINK_MAX_WORDS)
 
 
-def joined429(time_ns: npt.NDArray[np.int64], sizes: npt.NDArray[np.int64], bodies: bytes) -> Joined:
-    """The words of ARINC 429 packets (m,) of given device times, within 292 years, and bodies one behind the other."""
-    counts = sizes // ENTRY_429.itemsize
-    wrong = (counts * ENTRY_429.itemsize != sizes) | (counts < 1) | (counts > f.LINK_MAX_WORDS)
-    if wrong.any():
-        ends = np.cumsum(sizes)
-        whole = zip((ends - sizes).tolist(), (ends - sizes + counts * ENTRY_429.itemsize).tolist(), strict=True)
-        bodies = b"".join(bodies[start:end] for start, end in whole)
-    entries = np.frombuffer(bodies, ENTRY_429)
-    packet = np.repeat(np.arange(len(sizes)), counts)
-    times_ns, words = time_ns[packet] + entries["offset_ns"], entries["word"].copy()
-    back = (np.diff(times_ns) < 0) & (np.diff(packet) == 0)
-    if not back.any():
-        return Joined(times_ns, words, packet, int(wrong.sum()), 0)
-    backwards = np.isin(np.arange(len(sizes)), packet[1:][back])
-    kept = ~backwards[packet]
-    left_out = len(words) - int(kept.sum())
-    return Joined(times_ns[kept], words[kept], packet[kept], int((wrong | backwards).sum()), left_out)
+def joined429(
+    times_ns: npt.NDArray[np.int64], offsets_ns: npt.NDArray[np.int64], sizes: npt.NDArray[np.int64], bodies: bytes
+) -> Joined:
+    """The words of ARINC 429 packets (m,) of given device times, within 292 years, and bodies one behind the other.
+
+    Offsets (m,) lead from device times to the common ones.
+    """
+    most = len(bodies) // ENTRY_429.itemsize
+    time_ns, sent_ns, words = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.uint32)
+    count, malformed, left_out = entries(
+        times_ns, offsets_ns, sizes, np.frombuffer(bodies, np.uint8), time_ns, sent_ns, words
+    )
+    return Joined(time_ns[:count], sent_ns[:count], words[:count], malformed, left_out)
 
 
 def radar_word(packet: Packet) -> RadarWord:

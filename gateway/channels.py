@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decoders import formats as f
-from decoders.arinc429 import JoinRule
+from decoders.arinc429 import JoinRule, Values429
 from decoders.definitions import Definitions
 from decoders.health429 import BusHealth
 from decoders.profiles import Profile
@@ -32,12 +32,15 @@ class Channel429:
         """Whether it is read in this way already."""
         return (self.definitions, self.orientation, self.kind) == (definitions, orientation, kind)
 
-    def uses(self, words: NDArray[np.uint32], labels: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Which words (n,) come from the source that is to be used, as bits 9 and 10 say where they are no data."""
-        sdi = words >> np.uint32(8) & np.uint32(3)
+    def of_source(
+        self, time_ns: NDArray[np.int64], words: NDArray[np.uint32], values: Values429
+    ) -> tuple[NDArray[np.int64], NDArray[np.uint32], Values429]:
+        """The words (n,) of the source that is to be used, as bits 9 and 10 say where they are no data."""
         if self.sdi is None:
-            return np.ones(len(words), np.bool_)
-        return np.asarray((sdi == 0) | (sdi == self.sdi) | ~self.health.has_sdi[labels])
+            return time_ns, words, values
+        sdi = words >> np.uint32(8) & np.uint32(3)
+        used = (sdi == 0) | (sdi == self.sdi) | ~self.health.has_sdi[values.label]
+        return time_ns[used], words[used], Values429(*(column[used] for column in values))
 
     @property
     def role(self) -> str:

@@ -1,15 +1,15 @@
 """One bridge as the gateway knows it: its channels, its packet counter, its losses."""
 
-from collections import Counter, defaultdict, deque
-from collections.abc import Sequence
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from decoders import arinc429, control708
 from decoders import formats as f
 from decoders.definitions import Definitions, for_equipment, load_definitions
-from decoders.framing import Packet, PacketFramer
+from decoders.framing import Packet, PacketFramer, Packets
 from decoders.health429 import EQUIPMENT, BusHealth
 from decoders.profiles import Profile
 from decoders.racklink import ChannelCount, Hello, words429
@@ -17,11 +17,11 @@ from gateway.books import Books
 from gateway.channels import Channel429, Channel708
 from gateway.config import AdapterConfig, definitions_of, profile_of
 from gateway.framing import form_of
+from gateway.recent import RECENT, Recent
 from monitor.utc import TIME, UTC_LABELS
 
 SEQUENCE_RANGE = 1 << 32
 GOES_BACK_NS = 1_000_000_000  # more than any order of packets
-RECENT = 32  # packets among which a network may repeat or overtake one
 FLAG_NAMES = {
     f.FLAG_FIFO_OVERFLOW: "fifo_overflow",
     f.FLAG_PARITY: "parity_error",
@@ -43,7 +43,7 @@ class Link:
     losses: Counter[str] = field(default_factory=Counter)  # since the last verdict
     channels: dict[int, Channel429 | Channel708] = field(default_factory=dict)
     books: defaultdict[int, Books] = field(default_factory=lambda: defaultdict(Books))  # by channel
-    _recent: deque[Packet] = field(default_factory=lambda: deque(maxlen=RECENT))
+    _recent: Recent = field(default_factory=Recent)
     next_sequence: int = -1  # of the packet that is to come; none has come yet
     latest_ns: int = 0  # of the bridge's clock
     _clock_went_back: bool = False  # since the last heartbeat
@@ -161,12 +161,13 @@ class Link:
         self.next_sequence = (packet.sequence + 1) % SEQUENCE_RANGE
         return True
 
-    def count_plain(self, newest: Sequence[Packet], count: int) -> None:
-        """Count packets of words that follow the one before and each other; the newest of them, `RECENT` at least."""
-        self.counters["packets"] += count
-        self._recent.extend(newest)
-        self.next_sequence = (newest[-1].sequence + 1) % SEQUENCE_RANGE
-        self.latest_ns = newest[-1].time_ns
+    def count_plain(self, packets: Packets, own: NDArray[np.intp]) -> None:
+        """Count those packets of words that are this bridge's, which follow the one before and each other."""
+        self.counters["packets"] += len(own)
+        self._recent.extend(packets, own[-RECENT:].tolist())
+        newest = packets.header[own[-1]]
+        self.next_sequence = (int(newest["sequence"]) + 1) % SEQUENCE_RANGE
+        self.latest_ns = int(newest["time_ns"])
 
     def _count_flags(self, flags: int) -> None:
         for bit, name in FLAG_NAMES.items():

@@ -14,8 +14,9 @@ from decoders.racklink import ENTRY_429, MalformedBody, Packet, heartbeat, hello
 from gateway.channels import Channel429, Channel708
 from gateway.config import RackConfig, profile_of
 from gateway.hearing import QUIET_NS, RADAR, Hearing
-from gateway.link import RECENT, SPOILT, Link
+from gateway.link import SPOILT, Link
 from gateway.plain import (
+    CHANNELS,
     COUNT_BYTES,
     LATEST_DEVICE_NS,
     RADIALS,
@@ -115,13 +116,17 @@ class Listener:
             return 0
         self.now_ns = int(header["time_ns"][count - 1]) + int(offset_ns[count - 1])
         self.now_host_ns = int(batch.host_ns[count - 1])
-        for number in np.unique(batch.link[:count]).tolist():
+        places = batch.link[:count] * CHANNELS + header["channel"][:count]
+        for number, link in enumerate(links):
             own = np.flatnonzero(batch.link[:count] == number)
-            links[number].count_plain([batch.packets.packet(k) for k in own[-RECENT:]], len(own))
-            self.hearing.heard(links[number].config.name, int(batch.host_ns[own[-1]]))
-            for channel in np.unique(header["channel"][own]).tolist():
-                here = own[header["channel"][own] == channel]
-                self._put(links[number], channel, batch, here, offset_ns[here], int(ways.end_ns[number, channel]))
+            if not len(own):
+                continue
+            link.count_plain(batch.packets, own)
+            self.hearing.heard(link.config.name, int(batch.host_ns[own[-1]]))
+            for channel in np.flatnonzero(ways.kind[number]).tolist():
+                here = np.flatnonzero(places == number * CHANNELS + channel)
+                if len(here):
+                    self._put(link, channel, batch, here, offset_ns[here], int(ways.end_ns[number, channel]))
         return int(count)
 
     def _ways(self, links: Sequence[Link]) -> Ways:
@@ -160,13 +165,13 @@ class Listener:
             self.hearing.heard(f"{link.config.name}/{number}", host_ns)
             bodies = gathered(data, start[here], sizes).tobytes()
             waiting = self.words.setdefault((link.config.name, number), WaitingWords(channel))
-            waiting.put(times_ns.tolist(), sizes.tolist(), bodies, offset_ns.tolist(), end_ns)
+            waiting.put(times_ns, sizes, bodies, offset_ns, end_ns)
         else:
             words = len(here)
             link.counters["words_708"] += words
             self.hearing.heard(RADAR, host_ns)
             bodies = gathered(data, start[here] + COUNT_BYTES, sizes - COUNT_BYTES).tobytes()
-            self.radials.put_all(link, channel, (times_ns + offset_ns).tolist(), bodies)
+            self.radials.put_all(link, channel, times_ns + offset_ns, bodies)
         link.books[number].arrived += words
 
     def _packet(self, link: Link, packet: Packet, record: Raw) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from decoders import arinc429, arinc708, control708
 from decoders import formats as f
 from decoders.arinc708 import Radials
+from decoders.racklink import Joined
 from gateway.channels import Channel429
 from gateway.config import RackConfig
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, SummaryEvent
@@ -23,7 +24,7 @@ from gateway.link import Link
 from gateway.listening import Listener
 from gateway.records import Raw, Record, Status, Tick
 from gateway.telling import Telling
-from gateway.waiting import Radar, Words
+from gateway.waiting import Radar
 from monitor.aircraft import Aircraft, status_name
 from monitor.control_echo import ControlEcho
 from monitor.integrity import Comparison, Monitor, Verdict
@@ -141,16 +142,15 @@ class Pipeline:
             words, link = waiting.take(), listener.links[adapter]
             if words is None:
                 continue
-            link.counters["malformed_bodies"] += words.joined.malformed
-            link.counters["words_429_unused"] += words.joined.left_out
-            if len(words.joined.words):
+            link.counters["malformed_bodies"] += words.malformed
+            link.counters["words_429_unused"] += words.left_out
+            if len(words.words):
                 self._decode(link, f"{adapter}/{number}", waiting.channel, words)
         listener.words.clear()  # a channel may be another one from now on
         if radials := listener.radials.take():
             self._read_radials(radials)
 
-    def _decode(self, link: Link, about: str, channel: Channel429, words: Words) -> None:
-        joined = words.joined
+    def _decode(self, link: Link, about: str, channel: Channel429, joined: Joined) -> None:
         values = arinc429.decode(joined.words, channel.definitions, channel.orientation)
         for status, count in enumerate(np.bincount(values.status).tolist()):
             if status and count:
@@ -159,17 +159,14 @@ class Pipeline:
             state = "BUS_WRONG" if finding.wrong else "BUS_RIGHT"
             self._counters[f"{about}.{state.lower()}"] += 1
             self._telling.tell(about, state, finding.reason)
-        sent_ns = joined.time_ns + words.offset_ns
         if channel.is_panel:
             for k in np.flatnonzero(values.status == arinc429.Status.NORMAL):
                 definition = channel.definitions.labels[int(values.label[k])]
                 command = control708.decode(int(joined.words[k]), definition, self._echo.command)
-                self._echo.feed_command(int(sent_ns[k]), command)
-        used = channel.uses(joined.words, values.label)
-        if used.any():
-            true_ns = sent_ns - channel.delays_ns[values.label]
-            some = arinc429.Values429(values.label[used], values.value[used], values.status[used])
-            self.aircraft.feed(channel.definitions, true_ns[used], joined.words[used], some, channel.join_rule)
+                self._echo.feed_command(int(joined.sent_ns[k]), command)
+        true_ns = joined.sent_ns - channel.delays_ns[values.label]
+        some = channel.of_source(true_ns, joined.words, values)
+        self.aircraft.feed(channel.definitions, *some, channel.join_rule)
 
     def _read_radials(self, radials: Radar) -> None:
         unpacked = arinc708.unpack(radials.words, radials.channel.profile)

@@ -22,6 +22,7 @@ from gateway.waiting import LONGEST_WAIT_NS
 from monitor import scans
 
 LATEST_DEVICE_NS: Final = 1 << 62  # far beyond any clock, and far from overflow
+CHANNELS: Final = 256  # of a link
 CAREFUL, WORDS, RADIALS = range(3)  # how the packets of a channel are taken
 NEVER_NS: Final = np.iinfo(np.int64).max
 ENTRY_BYTES: Final = ENTRY_429.itemsize
@@ -47,7 +48,7 @@ class Batch(NamedTuple):
 
 
 class Ways(NamedTuple):
-    """How packets may be taken, by link and channel (links, 256)."""
+    """How packets may be taken, by link and channel (links, CHANNELS)."""
 
     kind: NDArray[np.uint8]
     end_ns: NDArray[np.int64]  # of the words that wait
@@ -56,7 +57,7 @@ class Ways(NamedTuple):
     @classmethod
     def careful(cls, links: int) -> "Ways":
         """Every packet needs care."""
-        shape = links, 256
+        shape = links, CHANNELS
         return cls(np.zeros(shape, np.uint8), np.zeros(shape, np.int64), np.full(shape, NEVER_NS))
 
 

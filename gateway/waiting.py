@@ -3,7 +3,7 @@
 How long they wait depends on records and device times alone, so a replay reads them at the same records as live.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,15 +15,10 @@ from gateway.channels import Channel429, Channel708
 from gateway.link import Link
 from monitor.scans import SweepWatch
 
+Numbers = Sequence[int] | NDArray[np.int64]
+
 LONGEST_WAIT_NS: Final = 1_000_000_000
 MOST_RADIALS: Final = 1024
-
-
-class Words(NamedTuple):
-    """ARINC 429 words of a channel, and what to add to the device time of each (n,) for the common time, ns."""
-
-    joined: Joined
-    offset_ns: NDArray[np.int64]
 
 
 class Radar(NamedTuple):
@@ -41,39 +36,37 @@ class WaitingWords:
     def __init__(self, channel: Channel429) -> None:
         self.channel = channel
         self.end_ns = 0  # of the last word that waits
-        self._times_ns: list[int] = []
-        self._offsets_ns: list[int] = []
-        self._sizes: list[int] = []
+        self._times_ns: list[Numbers] = []
+        self._offsets_ns: list[Numbers] = []
+        self._sizes: list[Numbers] = []
         self._bodies: list[bytes] = []
 
     def __len__(self) -> int:
         """Words that wait."""
-        return sum(self._sizes) // ENTRY_429.itemsize
+        return sum(map(len, self._bodies)) // ENTRY_429.itemsize
 
     @property
     def until_ns(self) -> int | None:
         """Device time from which on no packet can join, or None while nothing waits."""
-        return self._times_ns[0] + LONGEST_WAIT_NS if self._times_ns else None
+        return int(self._times_ns[0][0]) + LONGEST_WAIT_NS if self._times_ns else None
 
-    def put(
-        self, times_ns: Iterable[int], sizes: Iterable[int], bodies: bytes, offsets_ns: Iterable[int], end_ns: int
-    ) -> None:
+    def put(self, times_ns: Numbers, sizes: Numbers, bodies: bytes, offsets_ns: Numbers, end_ns: int) -> None:
         """Let packets wait, their bodies one behind the other; offsets lead from device times to the common ones."""
-        self._times_ns += times_ns
-        self._sizes += sizes
+        self._times_ns.append(times_ns)
+        self._sizes.append(sizes)
         self._bodies.append(bodies)
-        self._offsets_ns += offsets_ns
+        self._offsets_ns.append(offsets_ns)
         self.end_ns = end_ns
 
-    def take(self) -> Words | None:
+    def take(self) -> Joined | None:
         """All that waits, if anything does."""
         if not self._sizes:
             return None
-        times_ns, sizes, offsets_ns = (np.array(x, np.int64) for x in (self._times_ns, self._sizes, self._offsets_ns))
-        joined = joined429(times_ns, sizes, b"".join(self._bodies))
+        waiting_ns = np.concatenate(self._times_ns, dtype=np.int64), np.concatenate(self._offsets_ns, dtype=np.int64)
+        joined = joined429(*waiting_ns, np.concatenate(self._sizes, dtype=np.int64), b"".join(self._bodies))
         for waiting in (self._times_ns, self._sizes, self._offsets_ns, self._bodies):
             waiting.clear()
-        return Words(joined, offsets_ns[joined.packet])
+        return joined
 
 
 class WaitingRadials:
@@ -83,12 +76,13 @@ class WaitingRadials:
         self.link: Link | None = None
         self.channel: Channel708 | None = None
         self.watch = SweepWatch()
-        self._times_ns: list[int] = []
+        self._count = 0
+        self._times_ns: list[Numbers] = []
         self._words: list[bytes] = []
 
     def __len__(self) -> int:
         """Words that wait."""
-        return len(self._times_ns)
+        return self._count
 
     def put(self, link: Link, channel: Channel708, device_ns: int, offset_ns: int, word: bytes) -> bool:
         """Let a word of the channel's length wait; whether it may. All that waits is of one channel."""
@@ -96,10 +90,11 @@ class WaitingRadials:
         self.put_all(link, channel, [device_ns + offset_ns], word)
         return goes_on and len(self) < MOST_RADIALS
 
-    def put_all(self, link: Link, channel: Channel708, times_ns: list[int], words: bytes) -> None:
+    def put_all(self, link: Link, channel: Channel708, times_ns: Numbers, words: bytes) -> None:
         """Let words wait that `watch` has seen and that may, one behind the other."""
         self.link, self.channel = link, channel
-        self._times_ns += times_ns
+        self._count += len(times_ns)
+        self._times_ns.append(times_ns)
         self._words.append(words)
 
     def take(self) -> Radar | None:
@@ -107,6 +102,6 @@ class WaitingRadials:
         if not self._times_ns or self.link is None or self.channel is None:
             return None
         words = np.frombuffer(b"".join(self._words), np.uint8).reshape(len(self), -1)
-        times_ns = np.array(self._times_ns, np.int64)
-        self._times_ns, self._words = [], []
+        times_ns = np.concatenate(self._times_ns, dtype=np.int64)
+        self._count, self._times_ns, self._words = 0, [], []
         return Radar(self.link, self.channel, times_ns, words)

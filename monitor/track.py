@@ -79,12 +79,13 @@ class Track:
         A step is what its last sample before the time said.
         """
         found = Values(np.zeros(len(time_ns)), np.empty(len(time_ns), np.uint8))
-        samples = [column[self._row, : self._samples.end[self._row]] for column in self._samples[:3]]
+        filled = self._row, slice(self._samples.end[self._row])
+        times, values, statuses = (column[filled] for column in self._samples[:3])
         longest_ns = round(self.quantity.longest_gap_s / NS)
         if self.quantity.step:
-            _held(*samples, longest_ns, time_ns, *found)
+            _held(times, values, statuses, longest_ns, time_ns, *found)
         else:
-            _between(*samples, longest_ns, self.quantity.angle, time_ns, *found)
+            _between(times, values, statuses, longest_ns, self.quantity.angle, time_ns, *found)
         return found
 
     @property

@@ -9,8 +9,10 @@ from itertools import cycle
 import numpy as np
 import pytest
 from cobs import cobs
+from numpy.typing import NDArray
 
 from decoders import formats as f
+from decoders.framing import Packets
 from decoders.racklink import Framer, Packet
 from gateway.config import check_config
 from gateway.link import Link
@@ -130,9 +132,9 @@ def test_most_packets_of_a_flight_are_taken_many_at_once(monkeypatch: pytest.Mon
     packets = Counter[str]()
     count_plain, count = Link.count_plain, Link.count
 
-    def many(link: Link, newest: list[Packet], size: int) -> None:
-        packets["many"] += size
-        count_plain(link, newest, size)
+    def many(link: Link, batch: Packets, own: NDArray[np.intp]) -> None:
+        packets["many"] += len(own)
+        count_plain(link, batch, own)
 
     def one(link: Link, packet: Packet) -> bool:
         packets["one"] += 1
