@@ -80,13 +80,16 @@ class Listener:
         for packet in link.framer.feed(record.data):
             self._packet(link, packet, record)
 
-    def take_all(self, records: Sequence[Raw]) -> None:
-        """Take chunks of known adapters before which nothing was dropped: the same as one by one, and sooner."""
+    def framed(self, records: Sequence[Raw]) -> Batch:
+        """The packets that chunks of known adapters complete, before which nothing was dropped; for `take_all`."""
+        return framed([*self.links.values()], records)
+
+    def take_all(self, records: Sequence[Raw], batch: Batch) -> None:
+        """Take chunks and their packets: the same as one by one, and sooner."""
         for record in records:
             self.links[record.adapter].counters["chunks"] += 1
             self.hearing.bytes_came(record.adapter, record.stamp.monotonic_ns)
         links = [*self.links.values()]
-        batch = framed(links, records)
         at, end = 0, len(batch.link)
         while at < end:
             if end - at >= WORTH_WHILE:

@@ -5,7 +5,7 @@ ends or a tick passes, or a second of them has gathered, and are then decoded to
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from operator import itemgetter
@@ -77,17 +77,30 @@ class Pipeline:
 
     def feed_all(self, records: Iterable[Record]) -> list[Event]:
         """The events that many records cause: the same as one by one, and sooner."""
-        for together, group in groupby(records, self._goes_together):
-            if together:
-                self.listener.take_all([record for record in group if isinstance(record, Raw)])
+        for ahead, group in groupby(records, self._may_be_framed_ahead):
+            if ahead:
+                self._take_all([*group])
             else:
                 for record in group:
                     self._take(record)
         return self._telling.given()
 
-    def _goes_together(self, record: Record) -> bool:
+    def _may_be_framed_ahead(self, record: Record) -> bool:
         # What was dropped before a record is owned up to by the next verdict and not by one before.
-        return isinstance(record, Raw) and not record.dropped_before and record.adapter in self.listener.links
+        return not isinstance(record, Raw) or (not record.dropped_before and record.adapter in self.listener.links)
+
+    def _take_all(self, records: Sequence[Record]) -> None:
+        chunks = [record for record in records if isinstance(record, Raw)]
+        batch = self.listener.framed(chunks)
+        begin = 0
+        for is_chunk, group in groupby(records, lambda record: isinstance(record, Raw)):
+            if is_chunk:
+                end = begin + sum(1 for _ in group)
+                self.listener.take_all(chunks[begin:end], batch.of_records(begin, end))
+                begin = end
+            else:
+                for record in group:
+                    self._take(record)
 
     def _take(self, record: Record) -> None:
         self._telling.begin(record)

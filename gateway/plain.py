@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from decoders import formats as f
-from decoders.framing import Packets
+from decoders.framing import Packets, columns
 from decoders.racklink import ENTRY_429
 from gateway.link import GOES_BACK_NS, SEQUENCE_RANGE, Link
 from gateway.records import Raw
@@ -42,6 +42,11 @@ class Batch(NamedTuple):
     record: NDArray[np.int64]
     host_ns: NDArray[np.int64]
 
+    def of_records(self, first: int, end: int) -> "Batch":
+        """The packets of records from one up to another, whose indices count from the first of them."""
+        which = slice(*np.searchsorted(self.record, (first, end)))
+        return Batch(self.packets.of(which), self.link[which], self.record[which] - first, self.host_ns[which])
+
     def rest(self, at: int) -> "Batch":
         """All but the first ones."""
         return Batch(self.packets.of(slice(at, None)), self.link[at:], self.record[at:], self.host_ns[at:])
@@ -63,25 +68,27 @@ class Ways(NamedTuple):
 
 def framed(links: Sequence[Link], records: Sequence[Raw]) -> Batch:
     """The packets that some records complete, of adapters that `links` has."""
+    if not records:
+        return Batch(columns([], []), *np.empty((3, 0), np.int64))
     numbers = {link.config.name: number for number, link in enumerate(links)}
     of_link = np.array([numbers[record.adapter] for record in records])
     parts, link, record, base = [], [], [], 0
     for number in np.unique(of_link):
         own = np.flatnonzero(of_link == number)
-        packets = links[number].framer.frame([records[k].data for k in own.tolist()])
-        parts.append(packets._replace(start=packets.start + base))
-        link.append(np.full(len(packets.header), number))
-        record.append(own[packets.chunk])
-        base += len(packets.data)
+        part = links[number].framer.frame([records[k].data for k in own.tolist()])
+        parts.append(part._replace(start=part.start + base))
+        link.append(np.full(len(part.header), number))
+        record.append(own[part.chunk])
+        base += len(part.data)
     header, start, size, chunk, data = (np.concatenate(column) for column in zip(*parts, strict=True))
-    columns = Packets(header, start, size, chunk, data)
+    packets = Packets(header, start, size, chunk, data)
     links_of, records_of = np.concatenate(link), np.concatenate(record)
     if len(parts) > 1:
         order = np.argsort(records_of, kind="stable")
         links_of, records_of = links_of[order], records_of[order]
-        columns = columns.of(order)
+        packets = packets.of(order)
     host_ns = np.array([one.stamp.monotonic_ns for one in records], np.int64)[records_of]
-    return Batch(columns, links_of, records_of, host_ns)
+    return Batch(packets, links_of, records_of, host_ns)
 
 
 @njit(cache=True)

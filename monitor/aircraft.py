@@ -24,6 +24,7 @@ from monitor.settings import HeightSource
 from monitor.track import MISSING, NORMAL, STALE, Quantity, Samples, Track, put
 from monitor.utc import UTC_LABELS, UtcClock
 
+NO_GEOID = Geoid(0.0, int(Status.NO_COMPUTED_DATA), 0)  # a number of its own, as a member would be typed anew each time
 EPOCH_NS = 40_000_000  # a set is sent in one burst, at low speed in 35 ms
 
 
@@ -139,7 +140,7 @@ class Aircraft:
         """Geoid over ellipsoid at the newest position."""
         newest = [self.tracks[quantity.name].newest for quantity in (LATITUDE, LONGITUDE)]
         if self.height_source != "370" or newest[0] is None or newest[1] is None:
-            return Geoid(0.0, Status.NO_COMPUTED_DATA, 0)
+            return NO_GEOID
         (one_ns, latitude, one), (other_ns, longitude, other) = newest[0], newest[1]
         if max(one, other) != NORMAL:
             return Geoid(0.0, max(one, other), 0)
