@@ -1,7 +1,8 @@
 """From recorded chunks to words that wait: framing, losses, which channels are used, who is heard, and whose time.
 
 Nothing is decoded here but what says what a channel is. Whoever makes a `Listener` gives `read`, which takes what
-waits; it is called as soon as a radial may end its sweep, and before anything changes how words are to be read.
+waits and is called before anything changes how words are to be read, and `read_sweep`, which takes the radials and is
+called as soon as one may end its sweep.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,7 +41,12 @@ class Listener:
     """The bridges of a rack. `now_ns` is the common time of the latest word, `now_host_ns` when that was read."""
 
     def __init__(
-        self, config: RackConfig, telling: Telling, read: Callable[[], None], began_anew: Callable[[str, int], None]
+        self,
+        config: RackConfig,
+        telling: Telling,
+        read: Callable[[], None],
+        read_sweep: Callable[[], None],
+        began_anew: Callable[[str, int], None],
     ) -> None:
         profile = profile_of(config.radar_profile)
         self.links = {a.name: Link(a, profile) for a in config.adapters}
@@ -53,6 +59,7 @@ class Listener:
         self.now_host_ns: int | None = None
         self._telling = telling
         self._read = read
+        self._read_sweep = read_sweep
         self._began_anew = began_anew
         self._users: dict[str, tuple[Place, int]] = {}  # by role, and when last heard
         self._unused: dict[Place, str] = {}  # why a channel is not used, told already
@@ -291,6 +298,6 @@ class Listener:
         self._hear(RADAR, record)
         offset_ns = self._offset_ns(packet, record)
         if self.radials.link is not link or self.radials.channel is not channel:
-            self._read()
+            self._read_sweep()
         if not self.radials.put(link, channel, packet.time_ns, offset_ns, word.data):
-            self._read()
+            self._read_sweep()

@@ -24,7 +24,6 @@ from gateway.link import Link
 from gateway.listening import Listener
 from gateway.records import Raw, Record, Status, Tick
 from gateway.telling import Telling
-from gateway.waiting import Radar
 from monitor.aircraft import Aircraft, status_name
 from monitor.control_echo import ControlEcho
 from monitor.integrity import Comparison, Monitor, Verdict
@@ -57,7 +56,7 @@ class Pipeline:
         self._watcher = watcher
         self._tells_state = tells_state
         self._telling: Telling = before._telling if before else Telling()
-        self.listener = Listener(config, self._telling, self._read, self._clock_began_anew)
+        self.listener = Listener(config, self._telling, self._read, self._read_sweep, self._clock_began_anew)
         self.aircraft = Aircraft(config.monitor.height_source)
         self._scans = ScanBuilder()
         self._echo = ControlEcho(config.monitor.control_delay_s)
@@ -149,7 +148,18 @@ class Pipeline:
         self._telling.tell(adapter, "CLOCK_RESTARTED", reason)
 
     def _read(self) -> None:
-        """Decode all that waits: first what the aircraft and the panel say, then the radials, which may end a scan."""
+        """Decode all that waits, and judge the scans that the radials complete."""
+        scans = self._read_radials()
+        self._read_words()
+        self._judge(scans)
+
+    def _read_sweep(self) -> None:
+        """Decode the radials that wait; the aircraft's words too, if a scan has ended."""
+        if scans := self._read_radials():
+            self._read_words()
+            self._judge(scans)
+
+    def _read_words(self) -> None:
         listener = self.listener
         for (adapter, number), waiting in sorted(listener.words.items(), key=itemgetter(0)):
             words, link = waiting.take(), listener.links[adapter]
@@ -160,8 +170,6 @@ class Pipeline:
             if len(words.words):
                 self._decode(link, f"{adapter}/{number}", waiting.channel, words)
         listener.words.clear()  # a channel may be another one from now on
-        if radials := listener.radials.take():
-            self._read_radials(radials)
 
     def _decode(self, link: Link, about: str, channel: Channel429, joined: Joined) -> None:
         values = arinc429.decode(joined.words, channel.definitions, channel.orientation)
@@ -181,14 +189,18 @@ class Pipeline:
         some = channel.of_source(true_ns, joined.words, values)
         self.aircraft.feed(channel.definitions, *some, channel.join_rule)
 
-    def _read_radials(self, radials: Radar) -> None:
+    def _read_radials(self) -> list[Scan]:
+        """The scans that the radials complete which wait."""
+        radials = self.listener.radials.take()
+        if radials is None:
+            return []
         unpacked = arinc708.unpack(radials.words, radials.channel.profile)
         unusual = unpacked.unusual[unpacked.unusual > 0]
         for bit, name in enumerate(f.UNUSUAL_708):
             if count := int(np.count_nonzero(unusual >> bit & 1)):
                 radials.link.counters[f"words_708_{name}"] += count
         self._compare_with_command(radials.link, radials.times_ns.tolist(), unpacked)
-        self._judge(self._scans.feed(radials.times_ns, unpacked))
+        return [*self._scans.feed(radials.times_ns, unpacked)]
 
     def _compare_with_command(self, link: Link, times_ns: list[int], radials: Radials) -> None:
         if not self._echo.listens:
