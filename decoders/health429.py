@@ -3,7 +3,6 @@
 Findings are told when they begin and when they end, never word by word. Nothing is judged on less than a second of bus.
 """
 
-from collections import Counter
 from collections.abc import Iterator
 from typing import Final, NamedTuple, Self
 
@@ -75,7 +74,7 @@ class BusHealth:
         self._wrong: set[str] = set()
         self._second_ns: int | None = None  # when the current second began
         self._words = 0
-        self._known = Counter[str]()  # words since reading was last judged, by what they say of it
+        self._known = np.zeros(4, np.int64)  # words since reading was last judged, as `tally` counts them
 
     def feed(
         self, time_ns: npt.NDArray[np.int64], words: npt.NDArray[np.uint32], values: Values429
@@ -90,39 +89,23 @@ class BusHealth:
                 self._second_ns = int(time_ns[start])
                 self._rates = _Rates.none()
                 self._words = -1  # its first word opens the second and is not of it
-            end = int(np.searchsorted(time_ns[start:], self._second_ns + SECOND_NS)) + start + 1
-            part = slice(start, end)
-            yield from self._count(
-                time_ns[part], words[part], Values429(values.label[part], values.value[part], values.status[part])
-            )
-            if end <= len(time_ns):
+            block = time_ns, words, values.label, values.status
+            sets, tallies = (self.has_sdi, self._is_known, TURNED), (self._sources, self._known, *self._rates)
+            end, whole, named = kernels429.tally(start, self._second_ns + SECOND_NS, *block, *sets, *tallies)
+            self._words += end - start
+            if named:
+                yield from self._equipment(values, slice(start, end))
+            if whole:
                 yield from self._judge(int(time_ns[end - 1]))
             start = end
 
-    def _count(
-        self, time_ns: npt.NDArray[np.int64], words: npt.NDArray[np.uint32], values: Values429
-    ) -> Iterator[Finding]:
-        """Take words of one second; what a box says of itself is judged at once."""
-        good, known, turned, equipment = kernels429.tally(
-            time_ns,
-            words,
-            values.label,
-            values.status,
-            self.has_sdi,
-            self._is_known,
-            TURNED,
-            self._sources,
-            *self._rates,
-        )
-        self._words += len(words)
-        for what, count in (("good", good), ("bad parity", len(words) - good), ("known", known), ("turned", turned)):
-            self._known[what] += count
-        if equipment:
-            said = values.value[(values.label == EQUIPMENT) & (values.status == NORMAL)]
-            wrong = said.astype(int) & 0xFF != self._definitions.equipment_id & 0xFF
-            for code, is_wrong in zip(said.astype(int).tolist(), wrong.tolist(), strict=True):
-                form = "the box says it is equipment {:03X}, it is read as {}"
-                yield from self._tell("equipment", is_wrong, form, code, self._definitions.name)
+    def _equipment(self, values: Values429, part: slice) -> Iterator[Finding]:
+        """What the box says of itself is judged at once."""
+        said = (values.label[part] == EQUIPMENT) & (values.status[part] == NORMAL)
+        for code in values.value[part][said].astype(int).tolist():
+            wrong = code & 0xFF != self._definitions.equipment_id & 0xFF
+            form = "the box says it is equipment {:03X}, it is read as {}"
+            yield from self._tell("equipment", wrong, form, code, self._definitions.name)
 
     def _judge(self, now_ns: int) -> Iterator[Finding]:
         load, most = self._words * SECOND_NS / (now_ns - (self._second_ns or 0)), MOST_WORDS_PER_S[self._speed]
@@ -132,8 +115,9 @@ class BusHealth:
         doubtful, shared = kernels429.settle(now_ns, *self._bounds_ms, self._told, self._sources, *self._rates)
         for label in doubtful.tolist():
             yield from self._rate(label, now_ns)
-        if self._known["good"] + self._known["bad parity"] >= ENOUGH_WORDS:
-            yield from self._reading()
+        if self._known[:2].sum() >= ENOUGH_WORDS:
+            yield from self._reading(*self._known.tolist())
+            self._known[:] = 0
         form = "labels {} come from several sources (SDI): say with sdi which one the channel is to use"
         labels = ", ".join(f"{label:03o}" for label in shared.tolist())
         yield from self._tell("sources", bool(labels), form, labels)
@@ -164,23 +148,21 @@ class BusHealth:
         """What came so far of a label is judged."""
         self._rates.first_ns[label], self._rates.lately[label] = self._rates.last_ns[label], 1
 
-    def _reading(self) -> Iterator[Finding]:
-        good, bad = self._known["good"], self._known["bad parity"]
+    def _reading(self, good: int, bad: int, known: int, turned: int) -> Iterator[Finding]:
         form = "parity is bad in {} of {} words: noise, or bits in another order"
         yield from self._tell("parity", _beyond(bad / (good + bad), *BAD_PARITY), form, bad, good + bad)
         if good:
-            known, turned = self._known["known"] / good, self._known["turned"] / good
-            name, unclear = self._definitions.name, FEW <= known <= MORE
+            name, share, turned_share = self._definitions.name, known / good, turned / good
+            unclear = FEW <= share <= MORE
             form = (
                 "{:.0%} of the labels belong to {}, {:.0%} if read the other way round: "
                 "check the channel's orientation, which is {!r}"
             )
-            wrong = None if unclear else known < FEW and turned > MOST
-            yield from self._tell("orientation", wrong, form, known, name, turned, self._orientation)
+            wrong = None if unclear else share < FEW and turned_share > MOST
+            yield from self._tell("orientation", wrong, form, share, name, turned_share, self._orientation)
             form = "{:.0%} of the labels belong to {}: check the channel's definitions"
-            wrong = None if unclear else known < FEW and turned <= MOST
-            yield from self._tell("definitions", wrong, form, known, name)
-        self._known.clear()
+            wrong = None if unclear else share < FEW and turned_share <= MOST
+            yield from self._tell("definitions", wrong, form, share, name)
 
     def _tell(self, about: str, wrong: bool | None, form: str, *said: object) -> Iterator[Finding]:
         """Tell a change; None stands for neither right nor wrong, which changes nothing."""

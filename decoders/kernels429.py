@@ -249,30 +249,47 @@ def _characters(raw: Int) -> Int:
 
 @njit(cache=True)
 def tally(  # type: ignore[no-untyped-def] # typed by health429
-    time_ns, words, label, status, has_sdi, is_known, turned, sources, first_ns, last_ns, lately, ever
+    start,
+    until_ns,
+    time_ns,
+    words,
+    label,
+    status,
+    has_sdi,
+    is_known,
+    turned,
+    sources,
+    read,
+    first_ns,
+    last_ns,
+    lately,
+    ever,
 ):
-    """Count decoded words in rising time by label (256,) and by source (256, 4).
+    """Count decoded words in rising time by label (256,) and by source (256, 4), from one on to the first after a time.
 
-    Gives how many have a good parity, and of those how many have a known label, as they are and if turned round; and
-    how many normal words say which equipment sends.
+    Adds to `read` how many have a good parity, and a bad one, and of the good how many have a known label, as they are
+    and if turned round. Gives where it stopped, whether that was for the time, and how many words name the equipment.
     """
-    good = known = known_if_turned = equipment = 0
-    for i in range(words.size):
+    named = 0
+    for i in range(start, words.size):
         of = label[i]
         if status[i] == BAD_PARITY:
-            continue
-        if has_sdi[of]:
-            sources[of, words[i] >> 8 & 3] = True
-        good += 1
-        known += is_known[of]
-        known_if_turned += is_known[turned[of]]
-        equipment += of == EQUIPMENT and status[i] == NORMAL
-        if not ever[of]:
-            first_ns[of] = time_ns[i]
-        last_ns[of] = time_ns[i]
-        lately[of] += 1
-        ever[of] += 1
-    return good, known, known_if_turned, equipment
+            read[1] += 1
+        else:
+            read[0] += 1
+            read[2] += is_known[of]
+            read[3] += is_known[turned[of]]
+            if has_sdi[of]:
+                sources[of, words[i] >> 8 & 3] = True
+            named += of == EQUIPMENT and status[i] == NORMAL
+            if not ever[of]:
+                first_ns[of] = time_ns[i]
+            last_ns[of] = time_ns[i]
+            lately[of] += 1
+            ever[of] += 1
+        if time_ns[i] >= until_ns:
+            return i + 1, True, named
+    return words.size, False, named
 
 
 @njit(cache=True)

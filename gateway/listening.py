@@ -5,6 +5,7 @@ waits and is called before anything changes how words are to be read, and `read_
 called as soon as one may end its sweep.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -93,9 +94,10 @@ class Listener:
 
     def take_all(self, records: Sequence[Raw], batch: Batch) -> None:
         """Take chunks and their packets: the same as one by one, and sooner."""
-        for record in records:
-            self.links[record.adapter].counters["chunks"] += 1
-            self.hearing.bytes_came(record.adapter, record.stamp.monotonic_ns)
+        for name, count in Counter(record.adapter for record in records).items():
+            self.links[name].counters["chunks"] += count
+        for name, record in {record.adapter: record for record in records}.items():  # the last of each
+            self.hearing.bytes_came(name, record.stamp.monotonic_ns)
         links = [*self.links.values()]
         at, end = 0, len(batch.link)
         while at < end:

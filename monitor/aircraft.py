@@ -138,8 +138,10 @@ class Aircraft:
 
     def _geoid(self) -> Geoid:
         """Geoid over ellipsoid at the newest position."""
+        if self.height_source != "370":
+            return NO_GEOID
         newest = [self.tracks[quantity.name].newest for quantity in (LATITUDE, LONGITUDE)]
-        if self.height_source != "370" or newest[0] is None or newest[1] is None:
+        if newest[0] is None or newest[1] is None:
             return NO_GEOID
         (one_ns, latitude, one), (other_ns, longitude, other) = newest[0], newest[1]
         if max(one, other) != NORMAL:

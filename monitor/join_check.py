@@ -6,6 +6,7 @@ is the true one. In the north and east both rules give the same and nothing can 
 """
 
 from collections import deque
+from statistics import fmean
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ class JoinCheck:
         """Why the other rule seems to be the right one, or None."""
         if len(self._joined[self._rule]) < EPOCHS:
             return None
-        roughness = {rule: float(np.mean(np.abs(np.diff(joined, 2)))) for rule, joined in self._joined.items()}
+        roughness = {rule: _roughness_deg([*joined]) for rule, joined in self._joined.items()}
         (other,) = set(JOIN_RULES) - {self._rule}
         if roughness[self._rule] < max(ROUGH_DEG, CLEARLY * roughness[other]):
             return None
@@ -42,3 +43,8 @@ class JoinCheck:
             f"joined by {self._rule!r} the position jumps {roughness[self._rule]:.6f} deg from epoch to epoch, "
             f"by {other!r} {roughness[other]:.6f}: set join_rule of the channel"
         )
+
+
+def _roughness_deg(joined: list[float]) -> float:
+    """The mean of the second differences, whatever their signs."""
+    return fmean(abs(a - 2 * b + c) for a, b, c in zip(joined, joined[1:], joined[2:], strict=False))
