@@ -9,20 +9,15 @@ from typing import Final, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from decoders import kernels429
-from decoders.arinc429 import Status, Values429
+from decoders import kernels429_health as kernels
+from decoders.arinc429 import Values429
 from decoders.definitions import Definitions
 from decoders.formats import KIND_429_LOW
 
 MOST_WORDS_PER_S: Final = {"high": 1e5 / 36, "low": 12.5e3 / 36}  # 36 bit times a word, its gap included
-# What begins a finding and what ends it lie apart, so that nothing on the edge is told every second.
-TOO_FAST: Final = (0.75, 0.9)  # of the shortest interval, on average between the words of a second or more
-TOO_SLOW: Final = (1.25, 1.1)  # of the longest
-STOPPED: Final = 3.0  # of the longest, and a second at least
-OFTEN: Final = 3  # words of a label before its silence means anything: a damaged label passes the parity too
 OVERLOAD: Final = 1.02  # of what the bus carries, for two clocks that differ
-EQUIPMENT: Final = kernels429.EQUIPMENT
-NORMAL: Final = int(Status.NORMAL)
+EQUIPMENT: Final = kernels.EQUIPMENT
+NORMAL: Final = kernels.NORMAL
 ENOUGH_WORDS: Final = 100  # before reading order and parity are judged
 FEW, MORE, MOST = 0.2, 0.4, 0.8  # shares of words
 BAD_PARITY: Final = (0.2, 0.1)
@@ -64,12 +59,9 @@ class BusHealth:
         self._sources = np.zeros((256, 4), np.bool_)  # by label and SDI, whether this second had such a word
         self._is_known = np.isin(np.arange(256), list(definitions.labels))
         intervals = [definitions.labels[k].interval_ms if self._is_known[k] else None for k in range(256)]
-        self._shortest_ms = [float(given[0]) if given else 0.0 for given in intervals]
-        self._longest_ms = [float((given[1] if given else None) or np.inf) for given in intervals]
-        shortest, longest = np.array(self._shortest_ms), np.array(self._longest_ms)
-        silent = np.maximum(STOPPED * longest, SECOND_NS / 1e6)
-        self._bounds_ms = TOO_FAST[1] * shortest, TOO_SLOW[1] * longest, silent  # within which nothing is to be told
-        self._told = np.zeros(256, np.bool_)  # by label, whether something is told of it that is not over
+        self._shortest_ms = np.array([float(given[0]) if given else 0.0 for given in intervals])
+        self._longest_ms = np.array([float((given[1] if given else None) or np.inf) for given in intervals])
+        self._told = np.zeros(256, np.uint8)  # by label, what is told of its rate and not over
         self._rates = _Rates.none()
         self._wrong: set[str] = set()
         self._second_ns: int | None = None  # when the current second began
@@ -91,7 +83,7 @@ class BusHealth:
                 self._words = -1  # its first word opens the second and is not of it
             block = time_ns, words, values.label, values.status
             sets, tallies = (self.has_sdi, self._is_known, TURNED), (self._sources, self._known, *self._rates)
-            end, whole, named = kernels429.tally(start, self._second_ns + SECOND_NS, *block, *sets, *tallies)
+            end, whole, named = kernels.tally(start, self._second_ns + SECOND_NS, *block, *sets, *tallies)
             self._words += end - start
             if named:
                 yield from self._equipment(values, slice(start, end))
@@ -112,9 +104,11 @@ class BusHealth:
         self.peak_words_per_s = max(self.peak_words_per_s, load)
         form = "{:.0f} words/s, a {} speed bus carries {:.1f} at most"
         yield from self._tell("load", load > OVERLOAD * most, form, load, self._speed, most)
-        doubtful, shared = kernels429.settle(now_ns, *self._bounds_ms, self._told, self._sources, *self._rates)
-        for label in doubtful.tolist():
-            yield from self._rate(label, now_ns)
+        changed, flags, mean_ms, silent_ms, shared = kernels.settle(
+            now_ns, self._shortest_ms, self._longest_ms, self._told, self._sources, *self._rates
+        )
+        for label, *found in zip(*(column.tolist() for column in (changed, flags, mean_ms, silent_ms)), strict=True):
+            yield from self._rate(label, *found)
         if self._known[:2].sum() >= ENOUGH_WORDS:
             yield from self._reading(*self._known.tolist())
             self._known[:] = 0
@@ -123,30 +117,20 @@ class BusHealth:
         yield from self._tell("sources", bool(labels), form, labels)
         self._second_ns, self._words = now_ns, 0
 
-    def _rate(self, label: int, now_ns: int) -> Iterator[Finding]:
-        rates, about = self._rates, f"{label:03o}"
+    def _rate(self, label: int, flags: int, mean_ms: float, silent_ms: float) -> Iterator[Finding]:
+        """Tell what has changed of a label's rate."""
         shortest, longest = self._shortest_ms[label], self._longest_ms[label]
-        stopped, fast, slow = f"label {about}", f"rate of {about}", f"slowness of {about}"
-        if rates.lately[label] > 1 and stopped in self._wrong:  # the gap that was told is no interval
-            self._judged(label)
-        if rates.lately[label] > 1:
-            mean_ms = float(rates.last_ns[label] - rates.first_ns[label]) / 1e6 / (rates.lately[label] - 1)
-            form = "label {} comes every {:.1f} ms, {:g} is the {} interval"
-            wrong = _beyond(-mean_ms, -TOO_FAST[0] * shortest, -TOO_FAST[1] * shortest)
-            yield from self._tell(fast, wrong, form, about, mean_ms, shortest, "shortest")
-            wrong = _beyond(mean_ms, TOO_SLOW[0] * longest, TOO_SLOW[1] * longest)
-            yield from self._tell(slow, wrong, form, about, mean_ms, longest, "longest")
-            self._judged(label)
-        if rates.ever[label] >= OFTEN:
-            silent_ms = (now_ns - int(rates.last_ns[label])) / 1e6
-            form = "label {} has not come for {:.0f} ms, {:g} is the longest interval"
-            wrong = silent_ms > max(STOPPED * longest, SECOND_NS / 1e6)
-            yield from self._tell(stopped, wrong, form, about, silent_ms, longest)
-        self._told[label] = bool({stopped, fast, slow} & self._wrong)
-
-    def _judged(self, label: int) -> None:
-        """What came so far of a label is judged."""
-        self._rates.first_ns[label], self._rates.lately[label] = self._rates.last_ns[label], 1
+        every = f"label {label:03o} comes every {mean_ms:.1f} ms"
+        silent = f"label {label:03o} has not come for {silent_ms:.0f} ms"
+        reasons = {
+            kernels.FAST: (f"rate of {label:03o}", f"{every}, {shortest:g} is the shortest interval"),
+            kernels.SLOW: (f"slowness of {label:03o}", f"{every}, {longest:g} is the longest interval"),
+            kernels.STOPPED: (f"label {label:03o}", f"{silent}, {longest:g} is the longest interval"),
+        }
+        for flag, (about, reason) in reasons.items():
+            if (flags ^ int(self._told[label])) & flag:
+                yield _finding(about, bool(flags & flag), reason)
+        self._told[label] = flags
 
     def _reading(self, good: int, bad: int, known: int, turned: int) -> Iterator[Finding]:
         form = "parity is bad in {} of {} words: noise, or bits in another order"
@@ -168,7 +152,11 @@ class BusHealth:
         """Tell a change; None stands for neither right nor wrong, which changes nothing."""
         if wrong is not None and wrong != (about in self._wrong):
             (self._wrong.add if wrong else self._wrong.discard)(about)
-            yield Finding(about, wrong, form.format(*said) if wrong else f"{about} is in order again")
+            yield _finding(about, wrong, form.format(*said))
+
+
+def _finding(about: str, wrong: bool, reason: str) -> Finding:
+    return Finding(about, wrong, reason if wrong else f"{about} is in order again")
 
 
 def _beyond(value: float, wrong_above: float, right_below: float) -> bool | None:

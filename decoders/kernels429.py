@@ -38,7 +38,6 @@ COLUMNS: Final = 10
 INVALID: Final = -(2**62)  # no field of a word is that small
 ENTRY_BYTES: Final = f.ENTRY_429_BYTES  # of a packet
 MOST_WORDS: Final = f.LINK_MAX_WORDS
-EQUIPMENT: Final = 0o377  # the label that says which box sends
 NORMAL: Final = int(Status.NORMAL)
 BAD_PARITY: Final = int(Status.BAD_PARITY)
 UNKNOWN_LABEL: Final = int(Status.UNKNOWN_LABEL)
@@ -245,74 +244,6 @@ def _characters(raw: Int) -> Int:
             return INVALID
         rest >>= CHARACTER_BITS
     return raw
-
-
-@njit(cache=True)
-def tally(  # type: ignore[no-untyped-def] # typed by health429
-    start,
-    until_ns,
-    time_ns,
-    words,
-    label,
-    status,
-    has_sdi,
-    is_known,
-    turned,
-    sources,
-    read,
-    first_ns,
-    last_ns,
-    lately,
-    ever,
-):
-    """Count decoded words in rising time by label (256,) and by source (256, 4), from one on to the first after a time.
-
-    Adds to `read` how many have a good parity, and a bad one, and of the good how many have a known label, as they are
-    and if turned round. Gives where it stopped, whether that was for the time, and how many words name the equipment.
-    """
-    named = 0
-    for i in range(start, words.size):
-        of = label[i]
-        if status[i] == BAD_PARITY:
-            read[1] += 1
-        else:
-            read[0] += 1
-            read[2] += is_known[of]
-            read[3] += is_known[turned[of]]
-            if has_sdi[of]:
-                sources[of, words[i] >> 8 & 3] = True
-            named += of == EQUIPMENT and status[i] == NORMAL
-            if not ever[of]:
-                first_ns[of] = time_ns[i]
-            last_ns[of] = time_ns[i]
-            lately[of] += 1
-            ever[of] += 1
-        if time_ns[i] >= until_ns:
-            return i + 1, True, named
-    return words.size, False, named
-
-
-@njit(cache=True)
-def settle(  # type: ignore[no-untyped-def] # typed by health429
-    now_ns, fast_ms, slow_ms, silent_ms, told, sources, first_ns, last_ns, lately, ever
-):
-    """End a second of tallies: labels of which there may be something to tell, and those that came from several boxes.
-
-    All others are judged: their words of this second are none of the next.
-    """
-    doubtful, shared = np.zeros(256, np.bool_), np.zeros(256, np.bool_)
-    for of in range(256):
-        shared[of] = int(sources[of, 1]) + sources[of, 2] + sources[of, 3] > 1
-        sources[of] = False
-        if not ever[of]:
-            continue
-        mean_ms = (last_ns[of] - first_ns[of]) / 1e6 / max(lately[of] - 1, 1)
-        kept = lately[of] < 2 or fast_ms[of] <= mean_ms <= slow_ms[of]
-        if told[of] or not kept or (now_ns - last_ns[of]) / 1e6 > silent_ms[of]:
-            doubtful[of] = True
-        elif lately[of] > 1:
-            first_ns[of], lately[of] = last_ns[of], 1
-    return np.flatnonzero(doubtful), np.flatnonzero(shared)
 
 
 @njit(cache=True)
