@@ -20,7 +20,8 @@ from decoders.results429 import Status, Values429, Words429
 __all__ = ["Status", "Values429", "Words429", "decode", "field", "join_position", "load_definitions", "text", "unpack"]
 
 JoinRule = Literal["concatenate", "toward_zero"]
-JOIN_RULES: Final = ("concatenate", "toward_zero")
+TOWARD_ZERO: Final = "toward_zero"
+JOIN_RULES: Final = ("concatenate", TOWARD_ZERO)
 
 
 ENCODING_CODES: Final = {
@@ -90,7 +91,7 @@ def join_position(
             f"{coarse_words.size} coarse and {fine_words.size} fine words: pass one fine word to each coarse"
         )
     degrees = np.empty(coarse_words.size)
-    kernels429.join_position(coarse_words, fine_words, rule == "toward_zero", degrees)
+    kernels429.join_positions(coarse_words, fine_words, rule == TOWARD_ZERO, degrees)
     return degrees
 
 

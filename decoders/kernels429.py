@@ -91,16 +91,22 @@ def decode(
 
 
 @njit(cache=True)
-def join_position(
+def join_positions(
     coarse: npt.NDArray[np.uint32], fine: npt.NDArray[np.uint32], toward_zero: bool, degrees: npt.NDArray[np.float64]
 ) -> None:
-    """Fill degrees: 21 bits of two's complement (bits 9-29), then 11 bits of remainder (bits 18-28)."""
+    """Fill degrees of pairs of words."""
     for i in range(coarse.size):
-        high = _signed(_bits(np.int64(coarse[i]), 9, 21), 21)
-        low = _bits(np.int64(fine[i]), 18, 11)
-        if toward_zero and high < 0:
-            low = -low
-        degrees[i] = (high * 2048 + low) * (180 / 2**31)
+        degrees[i] = join_position(coarse[i], fine[i], toward_zero)
+
+
+@njit(cache=True)
+def join_position(coarse: Int, fine: Int, toward_zero: bool) -> float:
+    """Degrees: 21 bits of two's complement (bits 9-29), then 11 bits of remainder (bits 18-28)."""
+    high = _signed(_bits(np.int64(coarse), 9, 21), 21)
+    low = _bits(np.int64(fine), 18, 11)
+    if toward_zero and high < 0:
+        low = -low
+    return float((high * 2048 + low) * (180 / 2**31))
 
 
 @njit(cache=True)

@@ -13,7 +13,6 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from decoders import arinc429
 from decoders.arinc429 import JoinRule, Status, Values429
 from decoders.definitions import Definitions
 from monitor import geoid
@@ -163,9 +162,7 @@ class Aircraft:
             self._halves[axis.quantity.name] = half
             return
         coarse, fine = (half, other) if half.coarse else (other, half)
-        words = np.array([coarse.word], np.uint32), np.array([fine.word], np.uint32)
-        degrees = float(arinc429.join_position(*words, rule)[0])
+        degrees = self._joins[axis.quantity.name].feed(coarse.word, fine.word, rule)
         impossible = axis.quantity.name.endswith("latitude_deg") and abs(degrees) > 90
-        self._joins[axis.quantity.name].feed(*words, rule)
         status = int(Status.INVALID_DATA) if impossible else NORMAL
         self._append(axis.quantity, equipment, coarse.time_ns, degrees, status)

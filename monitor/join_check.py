@@ -8,10 +8,8 @@ is the true one. In the north and east both rules give the same and nothing can 
 from collections import deque
 from statistics import fmean
 
-import numpy as np
-from numpy.typing import NDArray
-
-from decoders.arinc429 import JOIN_RULES, JoinRule, join_position
+from decoders.arinc429 import JOIN_RULES, TOWARD_ZERO, JoinRule
+from decoders.kernels429 import join_position
 
 EPOCHS = 20  # looked at, after each of which the rules are compared
 ROUGH_DEG = 5e-5  # mean second difference that no flight and no receiver has: 5 m from one epoch to the next
@@ -25,11 +23,12 @@ class JoinCheck:
         self._joined: dict[str, deque[float]] = {rule: deque(maxlen=EPOCHS) for rule in JOIN_RULES}
         self._rule: JoinRule = "concatenate"
 
-    def feed(self, coarse: NDArray[np.uint32], fine: NDArray[np.uint32], rule: JoinRule) -> None:
-        """Take one pair of raw words (1,), joined by `rule`."""
+    def feed(self, coarse: int, fine: int, rule: JoinRule) -> float:
+        """The degrees of one pair of raw words, joined by `rule`."""
         self._rule = rule
-        for name in JOIN_RULES:
-            self._joined[name].append(float(join_position(coarse, fine, name)[0]))
+        for name, joined in self._joined.items():
+            joined.append(join_position(coarse, fine, name == TOWARD_ZERO))
+        return self._joined[rule][-1]
 
     def doubt(self) -> str | None:
         """Why the other rule seems to be the right one, or None."""

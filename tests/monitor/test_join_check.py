@@ -27,7 +27,7 @@ def checked(track: Floats, box: JoinRule, rule: JoinRule) -> str | None:
     check = JoinCheck()
     for degrees in track:
         coarse, fine = words(float(degrees), box)
-        check.feed(np.array([coarse], np.uint32), np.array([fine], np.uint32), rule)
+        check.feed(coarse, fine, rule)
     return check.doubt()
 
 
