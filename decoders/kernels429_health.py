@@ -44,26 +44,27 @@ def tally(  # type: ignore[no-untyped-def] # typed by health429
     Adds to `read` how many have a good parity, and a bad one, and of the good how many have a known label, as they are
     and if turned round. Gives where it stopped, whether that was for the time, and how many words name the equipment.
     """
-    named = 0
-    for i in range(start, words.size):
-        of = label[i]
-        if status[i] == BAD_PARITY:
-            read[1] += 1
-        else:
-            read[0] += 1
-            read[2] += is_known[of]
-            read[3] += is_known[turned[of]]
+    end, whole, named, before = start, False, 0, ever.copy()
+    while end < words.size and not whole:
+        of = label[end]
+        if status[end] != BAD_PARITY:
             if has_sdi[of]:
-                sources[of, words[i] >> 8 & 3] = True
-            named += of == EQUIPMENT and status[i] == NORMAL
+                sources[of, words[end] >> 8 & 3] = True
+            named += of == EQUIPMENT and status[end] == NORMAL
             if not ever[of]:
-                first_ns[of] = time_ns[i]
-            last_ns[of] = time_ns[i]
+                first_ns[of] = time_ns[end]
+            last_ns[of] = time_ns[end]
             lately[of] += 1
             ever[of] += 1
-        if time_ns[i] >= until_ns:
-            return i + 1, True, named
-    return words.size, False, named
+        whole = time_ns[end] >= until_ns
+        end += 1
+    for of in range(256):
+        count = ever[of] - before[of]
+        read[0] += count
+        read[2] += count * is_known[of]
+        read[3] += count * is_known[turned[of]]
+    read[1] += end - start - (ever - before).sum()
+    return end, whole, named
 
 
 @njit(cache=True)

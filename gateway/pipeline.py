@@ -173,7 +173,7 @@ class Pipeline:
 
     def _decode(self, link: Link, about: str, channel: Channel429, joined: Joined) -> None:
         values = arinc429.decode(joined.words, channel.definitions, channel.orientation)
-        for status, count in enumerate(np.bincount(values.status).tolist()):
+        for status, count in enumerate(np.bincount(values.status).tolist()) if values.status.any() else ():
             if status and count:
                 link.counters[f"words_429_{arinc429.Status(status).name.lower()}"] += count
         for finding in channel.health.feed(joined.time_ns, joined.words, values):

@@ -90,8 +90,8 @@ class Aircraft:
     ) -> None:
         """Take one decoded block of a channel (n,): raw words, their values, and when each was true (i8, ns)."""
         equipment = definitions.equipment_id & 0xFF
-        own = self._of_one_source(definitions, time_ns, words, values)
-        for k in np.flatnonzero(_one_by_one(equipment)[values.label] & own).tolist():
+        own = np.empty(len(words), np.bool_)
+        for k in self._of_one_source(definitions, time_ns, words, values, own):
             label = int(values.label[k])
             if axis := AXIS_OF.get((equipment, label)):
                 half = _Half(int(time_ns[k]), int(words[k]), int(values.status[k]), label == axis.coarse)
@@ -113,19 +113,20 @@ class Aircraft:
         return self._strange | {name: doubt for name, check in self._joins.items() if (doubt := check.doubt())}
 
     def _of_one_source(
-        self, definitions: Definitions, time_ns: NDArray[np.int64], words: NDArray[np.uint32], values: Values429
-    ) -> NDArray[np.bool_]:
-        """Which words (n,) are not of another source than the one in use: the first heard, until it falls silent."""
-        equipment, own = definitions.equipment_id & 0xFF, np.empty(len(words), np.bool_)
-        source, last_ns, others = own_words(
-            time_ns,
-            words,
-            values.label,
-            values.status,
-            _has_sdi(definitions),
-            *self._sources.get(equipment, (0, 0)),
-            own,
-        )
+        self,
+        definitions: Definitions,
+        time_ns: NDArray[np.int64],
+        words: NDArray[np.uint32],
+        values: Values429,
+        own: NDArray[np.bool_],
+    ) -> list[int]:
+        """Mark the words (n,) that are not of another source than the one in use: the first heard, until it is silent.
+
+        Gives those of them that are to be taken in their order.
+        """
+        equipment = definitions.equipment_id & 0xFF
+        kinds, before = (_has_sdi(definitions), _one_by_one(equipment)), self._sources.get(equipment, (0, 0))
+        in_order, source, last_ns, others = own_words(time_ns, words, values.label, values.status, *kinds, *before, own)
         self._sources[equipment] = source, last_ns
         if others:
             left_out = ", ".join(str(sdi) for sdi in range(4) if others >> sdi & 1)
@@ -133,7 +134,8 @@ class Aircraft:
                 f"words of SDI {left_out} are left out, as this one was heard first: "
                 "say with sdi which one the channel is to use, or with definitions that bits 9 and 10 are data"
             )
-        return own
+        found: list[int] = in_order.tolist()
+        return found
 
     def _geoid(self) -> Geoid:
         """Geoid over ellipsoid at the newest position."""

@@ -104,14 +104,15 @@ def claim(samples, owners, row, equipment, time_ns, longest_ns):  # type: ignore
 
 @njit(cache=True)
 def own_words(  # type: ignore[no-untyped-def] # typed by Aircraft
-    time_ns, words, label, status, has_sdi, source, last_ns, own
+    time_ns, words, label, status, has_sdi, in_order, source, last_ns, own
 ):
     """Mark in `own` (n,) the words that are not of another source than the one in use, 0 if none was heard yet.
 
-    Words to all (SDI 0), words without an SDI and damaged ones, whose SDI says nothing, are of every source. Gives the
-    source (SDI) in use, when it was last heard, and a bit for each of the others that were.
+    Words to all (SDI 0), words without an SDI and damaged ones, whose SDI says nothing, are of every source. Gives
+    which of them have a label of `in_order`, the source (SDI) in use, when it was last heard, and a bit for each of
+    the others that were.
     """
-    heard, others = False, 0
+    heard, others, count, ordered = False, 0, 0, np.empty(words.size, np.int64)
     for i in range(words.size):
         named = has_sdi[label[i]] and status[i] != BAD_PARITY
         sdi = int(words[i]) >> 8 & 3 if named else 0
@@ -124,4 +125,7 @@ def own_words(  # type: ignore[no-untyped-def] # typed by Aircraft
             last_ns = time_ns[i]
         elif sdi:
             others |= 1 << sdi
-    return source, last_ns, others
+        if own[i] and in_order[label[i]]:
+            ordered[count] = i
+            count += 1
+    return ordered[:count], source, last_ns, others
