@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from scipy.stats import median_abs_deviation
+from scipy.special import ndtri
 
 from monitor.disparity import clipped, robust_statistic, robust_threshold
 
+QUARTILE = float(ndtri(0.75))  # of a normal distribution: half of it lies nearer to its median
 CLIP_FACTOR = 2.0
 
 
@@ -119,7 +120,7 @@ def fit(
         )
     pooled = np.concatenate(usable)
     median = float(np.median(pooled))
-    spread = float(median_abs_deviation(pooled, scale="normal"))
+    spread = float(np.median(np.abs(pooled - median)) / QUARTILE)
     if not spread:
         raise ValueError("half of the disparities are equal, so they have no spread: fit to a radar with its noise")
     sigma = float(np.sqrt(np.mean(clipped(pooled, median, CLIP_FACTOR * spread) ** 2)))
