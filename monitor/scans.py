@@ -248,7 +248,11 @@ def _usual(steps_deg: NDArray[np.float64]) -> float:
     """The radar's own step, which whole codes round up and down: the mean of those nearest to the median."""
     if not steps_deg.size:
         return 0.0
-    return float(steps_deg[np.abs(steps_deg - np.median(steps_deg)) < JITTER_DEG].mean())
+    median = np.median(steps_deg)
+    near = np.abs(steps_deg - median) < JITTER_DEG
+    if not near.any():  # it lies between two far apart, and missing radials only lengthen a step
+        near = np.abs(steps_deg - steps_deg[steps_deg < median].max()) < JITTER_DEG
+    return float(steps_deg[near].mean())
 
 
 def _cut_off(before: Scan, scan: Scan, step_deg: float) -> int:
