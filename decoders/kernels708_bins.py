@@ -44,8 +44,8 @@ def mean_step(bins: Bytes, apart: int) -> float:
     for i in range(bins.shape[0]):
         near, far = bins[i, :-apart], bins[i, apart:]
         for j in range(far.size):
-            total += abs(np.int16(far[j]) - np.int16(near[j]))
-    return total / (bins.shape[0] * (bins.shape[1] - apart))
+            total += abs(int(far[j]) - int(near[j]))
+    return float(total / (bins.shape[0] * (bins.shape[1] - apart)))
 
 
 def _spread_word(_context: Any, width: Any, _length: Any, word: Any, bins: Any, level: Any) -> Any:
