@@ -129,20 +129,21 @@ def walk(delta: NDArray[np.float64], dmin: float, dmax: float, out: NDArray[np.i
     n = delta.size
     top = dmin
     lit = False
-    dark = DEM_INITIAL
+    first = n  # above dmin
     for j in range(n):
         d = delta[j]
         if d > top:
             top = d
             lit = d <= dmax
-            dark = DEM_SHADOW
+            first = min(first, j)
         elif d < top:
             lit = False
-        state = dark
         if lit:
             following = delta[j + 1] if j + 1 < n else d
-            state = DEM_PEAK if following < d or following > dmax else DEM_LIT
-        out[j] = max(out[j], state)
+            out[j] = max(out[j], DEM_PEAK if (following < d) | (following > dmax) else DEM_LIT)
+    behind = out[first:]
+    for j in range(behind.size):  # with no state to carry, many bins at a time
+        behind[j] = max(behind[j], DEM_SHADOW)
 
 
 @njit(cache=True)
