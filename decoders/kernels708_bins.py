@@ -44,7 +44,7 @@ def mean_step(bins: Bytes, apart: int) -> float:
     for i in range(bins.shape[0]):
         near, far = bins[i, :-apart], bins[i, apart:]
         for j in range(far.size):
-            total += abs(int(far[j]) - int(near[j]))
+            total += int(abs(np.int16(far[j]) - np.int16(near[j])))
     return float(total / (bins.shape[0] * (bins.shape[1] - apart)))
 
 
