@@ -8,7 +8,6 @@ step, and what is missing at its ends from the sweep before. An angle that tremb
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -74,11 +73,10 @@ class Scan:
     repeated: int
     cut_off: int = 0  # radials that the whole sweep before had at the ends, and this whole sweep has not
 
-    @cached_property
+    @property
     def sector_deg(self) -> tuple[float, float]:
         """The ends of the sweep; across the tail one of them lies beyond 180 degrees, as in (170, 190)."""
-        angles = np.unwrap(self.scan_angle_deg, period=360)
-        return float(angles.min()), float(angles.max())
+        return _sector(self.scan_angle_deg)
 
 
 class SweepWatch:
@@ -240,10 +238,10 @@ def _usual(steps_deg: NDArray[np.float64]) -> float:
     """The radar's own step, which whole codes round up and down: the mean of those nearest to the median."""
     if not steps_deg.size:
         return 0.0
-    median = np.median(steps_deg)
-    near = np.abs(steps_deg - median) < JITTER_DEG
-    if not near.any():  # it lies between two far apart, and missing radials only lengthen a step
-        near = np.abs(steps_deg - steps_deg[steps_deg < median].max()) < JITTER_DEG
+    lower, upper = np.sort(steps_deg)[[(steps_deg.size - 1) // 2, steps_deg.size // 2]]
+    near = np.abs(steps_deg - (lower + upper) / 2) < JITTER_DEG
+    if not near.any():  # the median lies between two far apart, and missing radials only lengthen a step
+        near = np.abs(steps_deg - lower) < JITTER_DEG
     return float(steps_deg[near].mean())
 
 
@@ -260,6 +258,15 @@ def _cut_off(before: Scan, scan: Scan, step_deg: float) -> int:
     if abs(_step(float(before.scan_angle_deg[-1]), begin)) <= JUMP_DEG:
         lost[min(lost, key=lambda end: abs(_step(end, begin)))] -= step_deg
     return sum(steps for steps in (round(degrees / step_deg) for degrees in lost.values()) if steps > 1)
+
+
+@njit(cache=True)
+def _sector(angle_deg: NDArray[np.float64]) -> tuple[float, float]:
+    at = low = high = angle_deg[0]
+    for k in range(1, angle_deg.size):
+        at += _step(angle_deg[k - 1], angle_deg[k])
+        low, high = min(low, at), max(high, at)
+    return low, high
 
 
 @njit(cache=True)
