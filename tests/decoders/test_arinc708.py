@@ -407,7 +407,7 @@ def test_bins_that_climb_and_fall_slowly_tell_whether_they_were_cut_at_the_wrong
     six, three = np.tile(slope * 3, (20, 1)), np.tile(slope // 3, (20, 1))
     assert [misread_bits(six), misread_bits(three)] == [None, None]
     assert misread_bits(np.stack([six & 7, six >> 3], axis=-1).reshape(20, -1)) == 6
-    assert misread_bits(three[:, ::2] | three[:, 1::2] << 3) == 3
+    assert misread_bits(three[:, ::2] + np.uint8(8) * three[:, 1::2]) == 3
 
 
 def test_the_mean_step_is_that_of_numpy() -> None:
