@@ -61,11 +61,9 @@ def misread_bits(bins: npt.NDArray[np.uint8]) -> int | None:
     """
     used = 6 if bins.max(initial=0) > 7 else 3
     thirds = bins if used == 3 else np.stack([bins & 7, bins >> 3], axis=-1).reshape(len(bins), -1)
-    thirds = thirds.astype(np.int16)
     if np.count_nonzero(thirds) < ENOUGH_LIT:
         return None
-    next_one = np.abs(thirds[:, 1:] - thirds[:, :-1]).mean()
-    one_after = np.abs(thirds[:, 2:] - thirds[:, :-2]).mean()
+    next_one, one_after = kernels708_bins.mean_step(thirds, 1), kernels708_bins.mean_step(thirds, 2)
     if used == 3:
         return 6 if next_one > CLEARLY * one_after else None
     return 3 if one_after > CLEARLY * next_one else None

@@ -37,6 +37,17 @@ def unpack_bins(words: Bytes, bits_per_bin: int, reserved_level: int, bins: Byte
         unusual[i] |= found << RESERVED_LEVEL
 
 
+@njit(cache=True, error_model="numpy")
+def mean_step(bins: Bytes, apart: int) -> float:
+    """How much bins (n, M) differ on the mean from those so many bins farther on the same radial; NaN without such."""
+    total = 0
+    for i in range(bins.shape[0]):
+        near, far = bins[i, :-apart], bins[i, apart:]
+        for j in range(far.size):
+            total += int(abs(np.int16(far[j]) - np.int16(near[j])))
+    return float(total / (bins.shape[0] * (bins.shape[1] - apart)))
+
+
 def _spread_word(_context: Any, width: Any, _length: Any, word: Any, bins: Any, level: Any) -> Any:
     """`_length` bins of `width` bits, 3 or 6, from a word, one a byte; whether any of them is `level`.
 

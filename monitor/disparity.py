@@ -40,7 +40,7 @@ def minimum_detectable_bias(n: int, sigma_d: float, p_fa: float, p_md: float) ->
 
 def clipped(d: ArrayLike, median: float, clip: float) -> NDArray[np.float64]:
     """Disparities about the calibrated median, held within +-clip bins."""
-    return np.clip(np.asarray(d, float) - median, -clip, clip)
+    return np.minimum(np.maximum(np.asarray(d, float) - median, -clip), clip)
 
 
 def robust_statistic(d: ArrayLike, median: float, clip: float, sigma: float) -> float:

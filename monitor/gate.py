@@ -12,13 +12,14 @@ from decoders.definitions import DefinitionError, Definitions
 from monitor.aircraft import Aircraft, status_name
 from monitor.geodesy import NM_M
 from monitor.quantities import GNSS, GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE
+from monitor.track import NORMAL
 
 MODE_LABEL, MODE_BITS = 0o273, 5
 # Bits 28 to 26 of label 273; bits 25 and 24 only tell kinds of navigation apart.
 MODES: Final = (
     "self test", "initialisation", "acquisition", "navigation", "altitude aiding", "reserved", "aided", "fault",
 )  # fmt: skip
-USABLE_MODES: Final = (3, 4, 6)
+USABLE_MODES: Final = frozenset((3, 4, 6))
 VOUCHING: Final = (GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE)
 
 
@@ -44,14 +45,13 @@ def position_doubts(
     """
     mode, limit, failure = (aircraft.tracks[quantity.name].at(time_ns) for quantity in VOUCHING)
     kind = mode.value.astype(np.intp) >> 2
-    known = (mode.status == 0) & (limit.status == 0) & (failure.status == 0)
+    known = (mode.status == NORMAL) & (limit.status == NORMAL) & (failure.status == NORMAL)
     doubts: dict[str, NDArray[np.bool_]] = {}
     for name, values in zip((q.name for q in VOUCHING), (mode, limit, failure), strict=True):
-        for status in np.unique(values.status[values.status > 0]).tolist():
+        for status in sorted({*values.status.tolist()} - {NORMAL}):
             doubts[f"{name}: {status_name(status)}"] = values.status == status
-    for code in np.unique(kind[known]).tolist():
-        if code not in USABLE_MODES:
-            doubts[f"the GNSS receiver's mode is {MODES[code]}"] = known & (kind == code)
+    for code in sorted({*kind[known].tolist()} - USABLE_MODES):
+        doubts[f"the GNSS receiver's mode is {MODES[code]}"] = known & (kind == code)
     loose = known & (limit.value > largest_limit_nm * NM_M)
     largest = limit.value[loose].max(initial=0.0) / NM_M
     doubts[f"the GNSS receiver's horizontal integrity limit is {largest:.6g} NM, above {largest_limit_nm:g}"] = loose

@@ -11,7 +11,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import pymap3d
 from numba import njit
 from numpy.typing import NDArray
 
@@ -100,6 +99,7 @@ def body_to_enu(
     return east, north, -down_level
 
 
+@njit(cache=True)
 def displace(
     latitude_deg: NDArray[np.float64],
     longitude_deg: NDArray[np.float64],
@@ -108,6 +108,27 @@ def displace(
     north_m: NDArray[np.float64],
     up_m: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Positions (degrees, metres) moved by local east, north and up metres (the lever arm)."""
-    lat, lon, height = pymap3d.enu2geodetic(east_m, north_m, up_m, latitude_deg, longitude_deg, height_m)
-    return np.asarray(lat), np.asarray(lon), np.asarray(height)
+    """Positions (n,), degrees and metres, moved by local east, north and up metres (the lever arm).
+
+    Back from Earth-centred coordinates by Bowring, Survey Review 181 (1976) and 218 (1985): to 1e-9 degrees and 0.1 mm
+    at the heights of aircraft.
+    """
+    latitude, longitude, height = np.empty(height_m.size), np.empty(height_m.size), np.empty(height_m.size)
+    for k in range(height_m.size):
+        phi, lam = math.radians(latitude_deg[k]), math.radians(longitude_deg[k])
+        _, prime = curvature_radii(phi)
+        rise = up_m[k] + height_m[k]
+        outward = (prime + rise) * math.cos(phi) - north_m[k] * math.sin(phi)  # from the axis, in the first meridian
+        x = outward * math.cos(lam) - east_m[k] * math.sin(lam)
+        y = outward * math.sin(lam) + east_m[k] * math.cos(lam)
+        z = (prime * (1 - ECCENTRICITY_SQUARED) + rise) * math.sin(phi) + north_m[k] * math.cos(phi)
+        p = math.hypot(x, y)
+        beta = math.atan2(z, p * (1 - FLATTENING))
+        polar_m = ECCENTRICITY_SQUARED * SEMI_MAJOR_M / (1 - FLATTENING)  # e'^2 b
+        phi = math.atan2(
+            z + polar_m * math.sin(beta) ** 3, p - ECCENTRICITY_SQUARED * SEMI_MAJOR_M * math.cos(beta) ** 3
+        )
+        _, prime = curvature_radii(phi)
+        latitude[k], longitude[k] = math.degrees(phi), math.degrees(math.atan2(y, x))
+        height[k] = p * math.cos(phi) + z * math.sin(phi) - SEMI_MAJOR_M**2 / prime
+    return latitude, longitude, height

@@ -121,7 +121,7 @@ class Monitor:
         """Where the antenna was and looked, on the radials whose state is known, and why others are not."""
         times = scan.time_ns[chosen]
         found = [aircraft.tracks[quantity.name].at(times) for quantity in NEEDED]
-        status = np.stack([values.status for values in found])
+        status = np.array([values.status for values in found])
         usable = (status == 0).all(axis=0)
         reasons = [
             f"{quantity.name}: {status_name(int(row[row > 0][0]))} on {np.count_nonzero(row)} of {len(times)} radials"
@@ -251,7 +251,7 @@ class Monitor:
     def _buried(self, pointing: Pointing) -> list[str]:
         """What forbids an ok where the aircraft is under the ground, as terrain in feet or a wrong datum puts it."""
         ground_m = self.terrain.elevation(pointing.latitude_deg, pointing.longitude_deg)
-        below_m = float(np.nanmax(ground_m - pointing.height_m, initial=0.0))
+        below_m = float(np.fmax.reduce(ground_m - pointing.height_m, initial=0.0))
         return [f"the aircraft is {below_m:.0f} m below the stored terrain: check unit and datum"] if below_m else []
 
     def _contradictions(self, comparison: Comparison, t_normalised: float) -> list[str]:
@@ -281,8 +281,7 @@ def thin(scan_angle_deg: NDArray[np.float64], spacing_deg: float) -> NDArray[np.
     """
     cell = np.round(scan_angle_deg / spacing_deg)
     order = np.lexsort((np.abs(scan_angle_deg - cell * spacing_deg), cell))
-    first = np.r_[True, np.diff(cell[order]) > 0] if len(order) else np.zeros(0, bool)
-    return np.sort(order[first])
+    return np.sort(order[np.diff(cell[order], prepend=-np.inf) > 0])
 
 
 def _share(unmatched: int, eligible: int) -> float | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from monitor.geodesy import Ray, along, curvature_radii, ray
 from monitor.shade import DEM_INITIAL, walk
-from monitor.terrain import Grid, blend, locate, sample
+from monitor.terrain import Grid, blend, corners, locate, sample
 
 SETTLED = 0.1  # of a bin: how far a bin's ground may move it and its place still counts as found
 LEVELS = (16, 4, 1)  # bins whose ground is looked up at once: every 16th, every fourth, every one
@@ -101,14 +101,16 @@ def tangents(
     track = _in_posts(grid, ray(latitude_deg, longitude_deg, (height_m + below) / 2, azimuth_rad))
     ground, guessed = _look(grid.height_m, track, height_m, below, ranges_m)
     tolerance = SETTLED * (ranges_m[1] - ranges_m[0]) if ranges_m.size > 1 else 0.0
+    end = 0  # beyond the last bin that is not settled
     for j in range(ranges_m.size):
         depth = height_m - ground[j]
         s = _distance(ranges_m[j], depth)
         settled = (abs(s - guessed[j]) <= tolerance) & (s > 0)
         delta[j] = _lowered(-depth / s, s * drop) if settled else math.nan
+        end = max(end, 0 if settled else j + 1)
     first = np.searchsorted(ranges_m, abs(height_m - below), "right")
     delta[:first] = -math.inf
-    for j in range(first, ranges_m.size):
+    for j in range(first, end):
         if math.isnan(delta[j]):
             for guess in (ground[j], ground[j - 1] if j else below):  # the second where the first leads over a void
                 ground[j] = _settle(grid.height_m, track, height_m, guess, ranges_m[j], tolerance)
@@ -130,25 +132,25 @@ def _look(post_m, track, height_m, below_m, ranges_m):  # type: ignore[no-untype
     Several plain loops, because each goes four bins at a time where one loop over all of it would go bin by bin.
     """
     n = ranges_m.size
-    places, posts = np.empty((6, n)), np.empty((2, n), np.uint32)
-    ground, guess, range_m = places[0], places[1], places[2]
-    distance, south, east = places[3], places[4], places[5]
-    row, column = posts[0], posts[1]
+    places, posts, pairs = np.empty((5, n)), np.empty((2, n), np.uint32), np.empty((2, n), np.complex64)
+    ground, guess, distance, south, east = places[0], places[1], places[2], places[3], places[4]
+    row, column, upper, lower = posts[0], posts[1], pairs[0], pairs[1]
     ground[0] = below_m
     known = 1
     for step in LEVELS:
-        size = (n - 1) // step + 1
+        range_m = ranges_m[::step]
+        size = range_m.size
         for j in range(size):
-            guess[j] = ground[min((j + 2) // 4, known - 1)]  # the nearest of the level before
-        for j in range(size):
-            range_m[j] = ranges_m[j * step]
+            guess[j] = ground[min(j + 2 >> 2, known - 1)]  # the nearest of the level before
         for j in range(size):
             distance[j] = _distance(range_m[j], height_m - guess[j])
         for j in range(size):
             r, c = along(track, distance[j])
             row[j], column[j], south[j], east[j] = locate(post_m, r, c)
         for j in range(size):
-            ground[j] = blend(post_m, row[j], column[j], south[j], east[j])
+            upper[j], lower[j] = corners(post_m, row[j], column[j])
+        for j in range(size):
+            ground[j] = blend(upper[j], lower[j], south[j], east[j])
         known = size
     return ground, distance
 
@@ -160,7 +162,8 @@ def _settle(post_m, track, height_m, ground_m, range_m, tolerance):  # type: ign
     s = _distance(range_m, height_m - ground_m)
     for look in range(MOST_LOOKS):
         r, c = along(track, s)
-        ground_m = blend(post_m, *locate(post_m, r, c))
+        i, j, south, east = locate(post_m, r, c)
+        ground_m = blend(*corners(post_m, i, j), south, east)
         found = _distance(range_m, height_m - ground_m)
         if not abs(found - s) > tolerance:
             break

@@ -33,6 +33,26 @@ SETTINGS = ("stabilised", "mode", "tilt", "range")
 SETTINGS_MASK = sum((1 << HEADER_708[name][1]) - 1 << HEADER_708[name][0] for name in SETTINGS)
 MOVES_CODES = math.ceil(JITTER_DEG / SCAN_ANGLE_LSB_DEG)
 JUMP_CODES = math.floor(JUMP_DEG / SCAN_ANGLE_LSB_DEG)
+BEYOND_LIMITS = 4  # of the annunciations: header bit 17
+
+SWEEP = np.dtype(  # the open sweep, all zero before its first radial
+    [
+        ("radials", "i8"),
+        ("last_ns", "i8"),  # of its last radial
+        ("last_deg", "f8"),
+        ("direction", "f8"),  # 1 or -1 once it is known
+        ("farthest_deg", "f8"),  # in the direction of the sweep
+        ("rest_deg", "f8"),  # where the antenna was when it last moved
+        ("moved_ns", "i8"),  # and when
+        ("at_rest", "i8"),  # radials since then
+        ("tilt_deg", "f8"),
+        ("range_nm", "f8"),
+        ("mode", "i8"),
+        ("stabilised", "?"),
+        ("bins", "i8"),
+        ("faults", "i8"),
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -56,8 +76,7 @@ class Scan:
     @property
     def sector_deg(self) -> tuple[float, float]:
         """The ends of the sweep; across the tail one of them lies beyond 180 degrees, as in (170, 190)."""
-        angles = np.unwrap(self.scan_angle_deg, period=360)
-        return float(angles.min()), float(angles.max())
+        return _sector(self.scan_angle_deg)
 
 
 class SweepWatch:
@@ -104,49 +123,26 @@ class ScanBuilder:
 
     def __init__(self) -> None:
         self.number = 0
-        self._rows: list[tuple[int, float, bool, NDArray[np.uint8]]] = []
-        self._settings = (0.0, 0.0, 0, False, 0)  # tilt, range, mode, stabilised, bins
-        self._faults = 0
-        self._direction = 0.0
-        self._farthest_deg = 0.0  # in the direction of the sweep
-        self._rest_deg = 0.0  # where the antenna was when it last moved
-        self._moved_ns = 0  # and when
-        self._at_rest = 0  # radials since then
+        self._sweep = np.zeros(1, SWEEP)
+        self._blocks: list[tuple[NDArray[Any], ...]] = []  # of its radials: time, scan angle, annunciations, bins
         self._began_whole = False
         self._before: Scan | None = None  # the last sweep that was whole, if it is the one before
 
     def feed(self, time_ns: NDArray[np.int64], radials: Radials) -> Iterator[Scan]:
         """Take radials (n,) in order of time; give the scans that they complete."""
-        limits = (radials.annunciations >> 4 & 1).astype(bool)  # header bit 17, the fifth annunciation
-        columns = (radials.tilt_deg, radials.range_nm, radials.mode, radials.stabilised)
-        settings = list(
-            zip(*(column.tolist() for column in columns), [radials.bins.shape[1]] * len(time_ns), strict=True)
-        )
-        rows = list(zip(time_ns.tolist(), radials.scan_angle_deg.tolist(), limits.tolist(), radials.bins, strict=True))
-        onward = _onward(time_ns, radials)
-        k = 0
-        while k < len(rows):
-            time, angle, _, _ = rows[k]
-            if self._rows:
-                turned, broken = self._turns(angle), self._breaks(time, angle)
-                if turned or broken or settings[k] != self._settings:
-                    yield self._close(whole=turned and not broken)
-            self._settings = settings[k]
-            self._follow(time, angle)
-            end = k + 1
-            if self._direction and self._farthest_deg == angle == self._rest_deg:
-                end += int(np.argmax(np.r_[onward[end:] != self._direction, True]))  # those that only go on
-                end = min(end, k + LONGEST_SWEEP - len(self._rows))
-            if end > k + 1:
-                self._farthest_deg = self._rest_deg = rows[end - 1][1]
-                self._moved_ns, self._at_rest = rows[end - 1][0], 0
-            self._faults |= int(np.bitwise_or.reduce(radials.faults[k:end]))
-            self._rows += rows[k:end]
-            k = end
+        columns = (time_ns, radials.scan_angle_deg, radials.annunciations, radials.bins)
+        begin = 0
+        while begin < len(time_ns):
+            end, whole = _add(self._sweep, begin, time_ns, radials)
+            if end > begin:
+                self._blocks.append(tuple(column[begin:end] for column in columns))
+            if end < len(time_ns):
+                yield self._close(whole)
+            begin = end
 
     def finish(self) -> Iterator[Scan]:
         """Give the sweep that is still open, if any."""
-        if self._rows:
+        if self._blocks:
             yield self._close(whole=False)
 
     def skip(self) -> int:
@@ -154,50 +150,26 @@ class ScanBuilder:
         self.number += 1
         return self.number - 1
 
-    def _breaks(self, time_ns: int, angle_deg: float) -> bool:
-        silent = not 0 <= time_ns - self._rows[-1][0] <= SILENCE_NS
-        stuck = abs(_step(self._rest_deg, angle_deg)) <= JITTER_DEG and time_ns - self._moved_ns > STUCK_NS
-        return silent or stuck or len(self._rows) >= LONGEST_SWEEP
-
-    def _turns(self, angle_deg: float) -> bool:
-        back = -_step(self._farthest_deg, angle_deg) * self._direction
-        return back > JITTER_DEG or abs(_step(self._rows[-1][1], angle_deg)) > JUMP_DEG
-
-    def _follow(self, time_ns: int, angle_deg: float) -> None:
-        """Keep how far the antenna has come, and since when it rests."""
-        if not self._rows:
-            self._direction = 0.0
-            self._farthest_deg = angle_deg
-        step = _step(self._farthest_deg, angle_deg)
-        if not self._direction and abs(step) > JITTER_DEG:
-            self._direction = float(np.sign(step))
-        if step * self._direction > 0:
-            self._farthest_deg = angle_deg
-        if not self._rows or abs(_step(self._rest_deg, angle_deg)) > JITTER_DEG:
-            self._rest_deg, self._moved_ns, self._at_rest = angle_deg, time_ns, 0
-        else:
-            self._at_rest += 1
-
     def _close(self, whole: bool) -> Scan:
-        tilt, range_nm, mode, stabilised, _ = self._settings
-        times, angles, limits, bins = zip(*self._rows, strict=True)
-        steps = np.abs(wrap(np.diff(np.array(angles))))
+        sweep = self._sweep[0]
+        times, angles, annunciations, bins = (np.concatenate(blocks) for blocks in zip(*self._blocks, strict=True))
+        steps = np.abs(wrap(np.diff(angles)))
         moving = steps[steps > 0]
         usual = _usual(moving)
-        rested = self._at_rest if times[-1] - self._moved_ns > STUCK_NS // 2 else 0  # trembling all the while
+        rested = sweep["at_rest"] if times[-1] - sweep["moved_ns"] > STUCK_NS // 2 else 0  # trembling all the while
         scan = Scan(
             self.number,
-            np.array(times, np.int64),
-            np.array(angles),
-            np.array(limits),
-            np.array(bins),
-            tilt,
-            range_nm,
-            mode,
-            stabilised,
-            self._faults,
+            times,
+            angles,
+            (annunciations >> BEYOND_LIMITS & 1).astype(bool),
+            bins,
+            float(sweep["tilt_deg"]),
+            float(sweep["range_nm"]),
+            int(sweep["mode"]),
+            bool(sweep["stabilised"]),
+            int(sweep["faults"]),
             missing=int(np.sum(np.maximum(np.round((moving - TREMBLE_DEG) / usual) - 1, 0))) if usual else 0,
-            repeated=max(int(np.sum(steps == 0)), rested),
+            repeated=int(max(len(steps) - len(moving), rested)),
         )
         if whole and self._began_whole:
             if self._before and usual:
@@ -206,27 +178,71 @@ class ScanBuilder:
         elif not whole:
             self._before = None
         self.number += 1
-        self._rows = []
-        self._faults = 0
+        self._sweep[:], self._blocks = 0, []
         self._began_whole = whole
         return scan
 
 
-def _onward(time_ns: NDArray[np.int64], radials: Radials) -> NDArray[np.float64]:
-    """Of radials (n,): the sign of a step from the one before that ends no sweep if it goes the sweep's way, else 0."""
-    steps = wrap(np.diff(radials.scan_angle_deg))
-    waited_ns = np.diff(time_ns)
-    plain = (np.abs(steps) > JITTER_DEG) & (np.abs(steps) <= JUMP_DEG) & (waited_ns >= 0) & (waited_ns <= SILENCE_NS)
-    for column in (radials.tilt_deg, radials.range_nm, radials.mode, radials.stabilised):
-        plain &= column[1:] == column[:-1]
-    return np.concatenate([[0.0], np.where(plain, np.sign(steps), 0.0)])
+@njit(cache=True)
+def _add(sweep: Any, first: int, time_ns: NDArray[np.int64], radials: Radials) -> tuple[int, bool]:
+    """Add radials from `first` on to a sweep until one begins the next: its index or n, and if the sweep is whole."""
+    s, bins = sweep[0], radials.bins.shape[1]
+    angles, tilts, ranges = radials.scan_angle_deg, radials.tilt_deg, radials.range_nm
+    modes, stabilised, faults = radials.mode, radials.stabilised, radials.faults
+    for k in range(first, time_ns.size):
+        time, angle = time_ns[k], angles[k]
+        if s.radials:
+            turned, broken = _turns(s, angle), _breaks(s, time, angle)
+            same = s.tilt_deg == tilts[k] and s.range_nm == ranges[k] and s.mode == modes[k]
+            same = same and s.stabilised == stabilised[k] and s.bins == bins
+            if turned or broken or not same:
+                return k, turned and not broken
+        s.tilt_deg, s.range_nm, s.mode, s.stabilised, s.bins = tilts[k], ranges[k], modes[k], stabilised[k], bins
+        s.faults |= faults[k]
+        _follow(s, time, angle)
+    return time_ns.size, False
+
+
+@njit(cache=True)
+def _breaks(s: Any, time_ns: Int, angle_deg: float) -> bool:
+    silent = not 0 <= time_ns - s.last_ns <= SILENCE_NS
+    stuck = abs(_step(s.rest_deg, angle_deg)) <= JITTER_DEG and time_ns - s.moved_ns > STUCK_NS
+    return silent or stuck or s.radials >= LONGEST_SWEEP
+
+
+@njit(cache=True)
+def _turns(s: Any, angle_deg: float) -> bool:
+    back = -_step(s.farthest_deg, angle_deg) * s.direction
+    return back > JITTER_DEG or abs(_step(s.last_deg, angle_deg)) > JUMP_DEG
+
+
+@njit(cache=True)
+def _follow(s: Any, time_ns: Int, angle_deg: float) -> None:
+    """Keep how far the antenna has come, and since when it rests."""
+    if not s.radials:
+        s.farthest_deg = angle_deg
+    step = _step(s.farthest_deg, angle_deg)
+    if not s.direction and abs(step) > JITTER_DEG:
+        s.direction = np.sign(step)
+    if step * s.direction > 0:
+        s.farthest_deg = angle_deg
+    if not s.radials or abs(_step(s.rest_deg, angle_deg)) > JITTER_DEG:
+        s.rest_deg, s.moved_ns, s.at_rest = angle_deg, time_ns, 0
+    else:
+        s.at_rest += 1
+    s.radials += 1
+    s.last_ns, s.last_deg = time_ns, angle_deg
 
 
 def _usual(steps_deg: NDArray[np.float64]) -> float:
     """The radar's own step, which whole codes round up and down: the mean of those nearest to the median."""
     if not steps_deg.size:
         return 0.0
-    return float(steps_deg[np.abs(steps_deg - np.median(steps_deg)) < JITTER_DEG].mean())
+    lower, upper = np.sort(steps_deg)[[(steps_deg.size - 1) // 2, steps_deg.size // 2]]
+    near = np.abs(steps_deg - (lower + upper) / 2) < JITTER_DEG
+    if not near.any():  # the median lies between two far apart, and missing radials only lengthen a step
+        near = np.abs(steps_deg - lower) < JITTER_DEG
+    return float(steps_deg[near].mean())
 
 
 def _cut_off(before: Scan, scan: Scan, step_deg: float) -> int:
@@ -244,5 +260,16 @@ def _cut_off(before: Scan, scan: Scan, step_deg: float) -> int:
     return sum(steps for steps in (round(degrees / step_deg) for degrees in lost.values()) if steps > 1)
 
 
+@njit(cache=True)
+def _sector(angle_deg: NDArray[np.float64]) -> tuple[float, float]:
+    at = low = high = angle_deg[0]
+    for k in range(1, angle_deg.size):
+        at += _step(angle_deg[k - 1], angle_deg[k])
+        low, high = min(low, at), max(high, at)
+    return low, high
+
+
+@njit(cache=True)
 def _step(from_deg: float, to_deg: float) -> float:
-    return (to_deg - from_deg + 180) % 360 - 180
+    step = to_deg - from_deg
+    return step - 360 * math.floor((step + 180) / 360)  # the remainder itself takes ten times as long

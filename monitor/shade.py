@@ -5,6 +5,8 @@ non-zero bin beside the zeros: front F is the last lit bin before a shadow, back
 is B - F - 1 and the centre C = (F + B) / 2, halves kept.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
@@ -53,49 +55,7 @@ def shadows(states: NDArray[np.int8], thread: str, min_size: int = 1, max_size: 
     """
     if thread not in ("radar", "dem"):
         raise ValueError(f'thread is "radar" or "dem", not {thread!r}')
-    found = _shadows(np.atleast_2d(states))
-    out = np.zeros(len(found), SHADOW)
-    out["radial"], out["front"], out["back"], out["size"], out["range_limited"] = found.T
-    out["centre"] = (out["front"] + out["back"]) / 2
-    return out[(out["size"] >= min_size) & (out["size"] <= (max_size if max_size is not None else states.shape[-1]))]
-
-
-def pair(radar_shadows: NDArray[np.void], dem_shadows: NDArray[np.void]) -> NDArray[np.void]:
-    """At most one pair per radial: the largest overlap in bins, then the longer shadows, then the nearer.
-
-    Range-limited shadows pair only with range-limited ones. Both inputs are ordered by radial, as `shadows` gives them;
-    `radar` and `dem` of the result are indices into them.
-    """
-    found = _pair(*_columns(radar_shadows), *_columns(dem_shadows))
-    out = np.zeros(len(found), PAIR)
-    out["radial"], out["radar"], out["dem"], out["overlap"] = found.T
-    return out
-
-
-def _columns(s: NDArray[np.void]) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
-    return (
-        np.ascontiguousarray(s["radial"]),
-        np.ascontiguousarray(s["front"]),
-        np.ascontiguousarray(s["back"]),
-        np.ascontiguousarray(s["range_limited"]),
-    )
-
-
-def unmatched_share(
-    mine: NDArray[np.void], others: NDArray[np.void], other_states: NDArray[np.int8], min_overlap: float = 0.5
-) -> tuple[int, int]:
-    """How many of one thread's eligible shadows have no partner, and how many are eligible.
-
-    Eligible are the shadows that lie wholly beyond the other thread's first lit bin and outside its range-limited
-    shadow; a partner overlaps by at least `min_overlap` of intersection over union.
-    """
-    lit = other_states > 0
-    first_lit = np.where(lit.any(axis=1), lit.argmax(axis=1) + 1, other_states.shape[1] + 1)
-    limit = np.full(len(other_states), other_states.shape[1])
-    tail = others[others["range_limited"]]
-    limit[tail["radial"]] = tail["front"]
-    unmatched, eligible = _unmatched(*_columns(mine), *_columns(others), first_lit, limit, min_overlap)
-    return unmatched, eligible
+    return _shadows(np.atleast_2d(states), min_size, states.shape[-1] if max_size is None else max_size)
 
 
 @njit(cache=True)
@@ -129,24 +89,25 @@ def walk(delta: NDArray[np.float64], dmin: float, dmax: float, out: NDArray[np.i
     n = delta.size
     top = dmin
     lit = False
-    dark = DEM_INITIAL
+    first = n  # above dmin
     for j in range(n):
         d = delta[j]
         if d > top:
             top = d
             lit = d <= dmax
-            dark = DEM_SHADOW
+            first = min(first, j)
         elif d < top:
             lit = False
-        state = dark
         if lit:
             following = delta[j + 1] if j + 1 < n else d
-            state = DEM_PEAK if following < d or following > dmax else DEM_LIT
-        out[j] = max(out[j], state)
+            out[j] = max(out[j], DEM_PEAK if (following < d) | (following > dmax) else DEM_LIT)
+    behind = out[first:]
+    for j in range(behind.size):  # with no state to carry, many bins at a time
+        behind[j] = max(behind[j], DEM_SHADOW)
 
 
 @njit(cache=True)
-def _shadows(states: NDArray[np.int8]) -> NDArray[np.int32]:
+def _shadows(states: NDArray[np.int8], min_size: int, max_size: int) -> NDArray[np.void]:
     bins = states.shape[1]
     found = []
     for i in range(states.shape[0]):
@@ -154,75 +115,95 @@ def _shadows(states: NDArray[np.int8]) -> NDArray[np.int32]:
         for j in range(1, bins + 1):
             if states[i, j - 1] > 0:
                 if front and j - front > 1:
-                    found.append((i, front, j, j - front - 1, 0))
+                    found.append((i, front, j, j - front - 1, False))
                 front = j
         # A shadow open at the end needs a front edge, or the blocked beam of state G that never was lit has none.
         if front and front < bins:
-            found.append((i, front, bins, bins - front, 1))
-    out = np.empty((len(found), 5), np.int32)
+            found.append((i, front, bins, bins - front, True))
+    found = [shadow for shadow in found if min_size <= shadow[3] <= max_size]
+    out = np.empty(len(found), SHADOW)
     for k in range(len(found)):
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = found[k]
+        s = out[k]
+        s.radial, s.front, s.back, s.size, s.range_limited = found[k]
+        s.centre = (s.front + s.back) / 2
     return out
 
 
-@njit(cache=True, inline="always")
-def _last_dark(back: int, limited: bool) -> int:
-    return back if limited else back - 1
+@njit(cache=True)
+def _end(s: Any) -> Any:
+    """The last dark bin of a shadow."""
+    return s.back if s.range_limited else s.back - 1
 
 
 @njit(cache=True)
-def _pair(  # type: ignore[no-untyped-def] # eight columns, typed in _columns
-    r_radial, r_front, r_back, r_limited, d_radial, d_front, d_back, d_limited
-):
+def pair(radar_shadows: Any, dem_shadows: Any) -> NDArray[np.void]:
+    """At most one pair per radial: the largest overlap in bins, then the longer shadows, then the nearer.
+
+    Range-limited shadows pair only with range-limited ones. Both inputs are ordered by radial, as `shadows` gives them;
+    `radar` and `dem` of the result are indices into them.
+    """
     found = []
     start = 0
     k = 0
-    while k < r_radial.size:
-        radial = r_radial[k]
-        while start < d_radial.size and d_radial[start] < radial:
+    while k < radar_shadows.size:
+        radial = radar_shadows[k].radial
+        while start < dem_shadows.size and dem_shadows[start].radial < radial:
             start += 1
         best = (0, 0, 0)  # overlap, joint size, minus the nearer front
         pick = (-1, -1)
-        while k < r_radial.size and r_radial[k] == radial:
+        while k < radar_shadows.size and radar_shadows[k].radial == radial:
+            r = radar_shadows[k]
             m = start
-            while m < d_radial.size and d_radial[m] == radial:
-                if r_limited[k] == d_limited[m]:
-                    r_end, d_end = _last_dark(r_back[k], r_limited[k]), _last_dark(d_back[m], d_limited[m])
-                    overlap = min(r_end, d_end) - max(r_front[k], d_front[m])
-                    rank = (overlap, r_end - r_front[k] + d_end - d_front[m], -min(r_front[k], d_front[m]))
+            while m < dem_shadows.size and dem_shadows[m].radial == radial:
+                d = dem_shadows[m]
+                if r.range_limited == d.range_limited:
+                    overlap = min(_end(r), _end(d)) - max(r.front, d.front)
+                    rank = (overlap, _end(r) - r.front + _end(d) - d.front, -min(r.front, d.front))
                     if overlap > 0 and (pick[0] < 0 or rank > best):
                         best, pick = rank, (k, m)
                 m += 1
             k += 1
         if pick[0] >= 0:
             found.append((radial, pick[0], pick[1], best[0]))
-    out = np.empty((len(found), 4), np.int32)
+    out = np.empty(len(found), PAIR)
     for k in range(len(found)):
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = found[k]
+        p = out[k]
+        p.radial, p.radar, p.dem, p.overlap = found[k]
     return out
 
 
 @njit(cache=True)
-def _unmatched(  # type: ignore[no-untyped-def] # eight columns, typed in _columns
-    m_radial, m_front, m_back, m_limited, o_radial, o_front, o_back, o_limited, first_lit, limit, min_overlap
-):
-    unmatched = eligible = 0
-    start = 0
-    for k in range(m_radial.size):
-        radial = m_radial[k]
-        end = _last_dark(m_back[k], m_limited[k])
-        if m_limited[k] or m_front[k] < first_lit[radial] or end > limit[radial]:
+def _any_lit(states: NDArray[np.int8]) -> bool:
+    j = 0
+    while j < states.size and states[j] <= 0:
+        j += 1
+    return j < states.size
+
+
+@njit(cache=True)
+def unmatched_share(
+    mine: Any, others: Any, other_states: NDArray[np.int8], min_overlap: float = 0.5
+) -> tuple[int, int]:
+    """How many of one thread's eligible shadows have no partner, and how many are eligible.
+
+    Eligible are the shadows that lie wholly beyond the other thread's first lit bin and outside its range-limited
+    shadow; a partner overlaps by at least `min_overlap` of intersection over union.
+    """
+    unmatched = eligible = start = 0
+    for s in mine:
+        end = _end(s)
+        if s.range_limited or not _any_lit(other_states[s.radial, : s.front]):
             continue
-        eligible += 1
-        while start < o_radial.size and o_radial[start] < radial:
+        while start < others.size and others[start].radial < s.radial:
             start += 1
-        matched = False
+        matched = hidden = False
         m = start
-        while m < o_radial.size and o_radial[m] == radial:
-            other_end = _last_dark(o_back[m], o_limited[m])
-            overlap = min(end, other_end) - max(m_front[k], o_front[m])
-            union = max(end, other_end) - min(m_front[k], o_front[m])
-            matched |= overlap >= min_overlap * union
+        while m < others.size and others[m].radial == s.radial:
+            o = others[m]
+            overlap = min(end, _end(o)) - max(s.front, o.front)
+            matched |= overlap >= min_overlap * (max(end, _end(o)) - min(s.front, o.front))
+            hidden |= o.range_limited and end > o.front
             m += 1
-        unmatched += not matched
+        eligible += not hidden
+        unmatched += not (hidden or matched)
     return unmatched, eligible

@@ -144,7 +144,8 @@ def sample(grid: Grid, latitude_deg: float, longitude_deg: float) -> float:
     """Bilinear height in metres; NaN where one of the four posts is void or the place is outside."""
     row = (grid.north_deg - latitude_deg) / grid.row_deg
     column = (longitude_deg - grid.west_deg) / grid.column_deg
-    return blend(grid.height_m, *locate(grid.height_m, row, column))
+    i, j, south, east = locate(grid.height_m, row, column)
+    return blend(*corners(grid.height_m, i, j), south, east)
 
 
 @njit(cache=True)
@@ -154,9 +155,9 @@ def locate(height_m: NDArray[np.float32], row: float, column: float) -> tuple[np
     Without a branch, or a loop over places could not go four at a time. Any number, NaN too, gives a post that exists.
     """
     rows, columns = height_m.shape
-    i, j = np.int32(_within(row, rows - 2.0)), np.int32(_within(column, columns - 2.0))
+    i, j = np.floor(_within(row, rows - 2.0)), np.floor(_within(column, columns - 2.0))
     inside = (row >= 0) & (row <= rows - 1) & (column >= 0) & (column <= columns - 1)
-    return np.uint32(i), np.uint32(j), row - i if inside else math.nan, column - j
+    return np.uint32(np.int32(i)), np.uint32(np.int32(j)), row - i if inside else math.nan, column - j
 
 
 @njit(cache=True)
@@ -166,12 +167,18 @@ def _within(x: float, last: float) -> float:
 
 
 @njit(cache=True)
-def blend(height_m: NDArray[np.float32], i: np.uint32, j: np.uint32, south: float, east: float) -> float:
-    """Bilinear height between post (i, j) and its neighbours to the south and east, in double precision."""
+def corners(height_m: NDArray[np.float32], i: np.uint32, j: np.uint32) -> tuple[np.complex64, np.complex64]:
+    """Post (i, j) with its neighbour to the east, and those south of them: two numbers to move, not four."""
     k, m = i + np.uint32(1), j + np.uint32(1)
-    upper, lower = np.float64(height_m[i, j]), np.float64(height_m[k, j])
-    upper += (height_m[i, m] - upper) * east
-    lower += (height_m[k, m] - lower) * east
+    return np.complex64(complex(height_m[i, j], height_m[i, m])), np.complex64(complex(height_m[k, j], height_m[k, m]))
+
+
+@njit(cache=True)
+def blend(upper_m: np.complex64, lower_m: np.complex64, south: float, east: float) -> float:
+    """Bilinear height between the four `corners` of a place, in double precision."""
+    upper, lower = np.float64(upper_m.real), np.float64(lower_m.real)
+    upper += (upper_m.imag - upper) * east
+    lower += (lower_m.imag - lower) * east
     return float(upper + (lower - upper) * south)
 
 

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from decoders.arinc708 import unpack
+from decoders.formats import MODES_708, WORD_708_BYTES
 from monitor.aircraft import Aircraft
 from monitor.integrity import NEEDED, Monitor
-from monitor.scans import Scan
+from monitor.scans import ScanBuilder
 
 SECOND_NS = 1_000_000_000
 
@@ -23,20 +25,15 @@ def warm_up(monitor: Monitor) -> None:
         values = np.full(2, middle.get(quantity.name, 0.0))
         aircraft.tracks[quantity.name].append(times, values, np.zeros(2, np.uint8))
     angles = np.arange(-9.0, 10.0, 3.0)
-    bins = np.tile(np.arange(512, dtype=np.uint8) // 8 % 2, (len(angles), 1))
-    scan = Scan(
-        number=0,
-        time_ns=np.full(len(angles), SECOND_NS // 20),
+    n = len(angles)
+    radials = unpack(np.zeros((n, WORD_708_BYTES), np.uint8))._replace(
         scan_angle_deg=angles,
-        beyond_limits=np.zeros(len(angles), bool),
-        bins=bins,
-        tilt_deg=-2.0,
-        range_nm=10.0,
-        mode=2,
-        stabilised=True,
-        faults=0,
-        missing=0,
-        repeated=0,
+        bins=np.tile(np.arange(512, dtype=np.uint8) // 8 % 2, (n, 1)),
+        mode=np.full(n, MODES_708["map"], np.uint8),
+        tilt_deg=np.full(n, -2.0),
+        range_nm=np.full(n, 10.0),
     )
+    builder = ScanBuilder()
+    scans = [*builder.feed(np.full(n, SECOND_NS // 20), radials), *builder.finish()]
     settings = monitor.settings.model_copy(update={"minimum_pairs": 2, "position_gate": False})
-    Monitor(monitor.terrain, settings).judge(scan, aircraft)
+    Monitor(monitor.terrain, settings).judge(scans[0], aircraft)

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from decoders import formats, layouts
-from decoders.arinc708 import Header, Radials, headers, load_profile, unpack
+from decoders.arinc708 import Header, Radials, headers, load_profile, misread_bits, unpack
+from decoders.kernels708_bins import mean_step
 from decoders.racklink import Framer
 from simulators import racklink
 from tests.decoders.bus import header708
@@ -399,3 +400,18 @@ def test_no_more_memory_is_taken_than_the_output_needs(
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < sum(getattr(found, name).nbytes for name in found._fields) + 50_000
+
+
+def test_bins_that_climb_and_fall_slowly_tell_whether_they_were_cut_at_the_wrong_bits() -> None:
+    slope = np.abs(np.arange(512) % 32 - 16).astype(np.uint8)  # 0 to 16 and back
+    six, three = np.tile(slope * 3, (20, 1)), np.tile(slope // 3, (20, 1))
+    assert [misread_bits(six), misread_bits(three)] == [None, None]
+    assert misread_bits(np.stack([six & 7, six >> 3], axis=-1).reshape(20, -1)) == 6
+    assert misread_bits(three[:, ::2] + np.uint8(8) * three[:, 1::2]) == 3
+
+
+def test_the_mean_step_is_that_of_numpy() -> None:
+    bins = np.random.default_rng(1).integers(0, 64, (9, 256)).astype(np.uint8)
+    for apart in (1, 2):
+        steps = bins[:, apart:].astype(int) - bins[:, :-apart]
+        assert mean_step(bins, apart) == np.abs(steps).mean()

@@ -1,4 +1,4 @@
-"""Rays against pyproj, radii against pymap3d, and attitude against a product of rotation matrices."""
+"""Rays against pyproj, radii and lever arms against pymap3d, and attitude against a product of rotation matrices."""
 
 import numpy as np
 import pymap3d
@@ -103,3 +103,13 @@ def test_a_lever_arm_moves_the_position_as_pyproj_says() -> None:
     )
     found = to_enu.transform(moved[1], moved[0], moved[2])
     np.testing.assert_allclose(np.ravel(found), [12.0, -30.0, -2.5], atol=1e-6)
+
+
+def test_a_lever_arm_of_any_direction_moves_a_position_anywhere_to_a_tenth_of_a_millimetre() -> None:
+    random = np.random.default_rng(1)
+    latitude, longitude = random.uniform(-90, 90, 2000), random.uniform(-180, 180, 2000)
+    height_m, arm = random.uniform(-500, 15_000, 2000), random.uniform(-100, 100, (3, 2000))
+    found = np.array(displace(latitude, longitude, height_m, *arm))
+    right = np.array(pymap3d.enu2geodetic(*arm, latitude, longitude, height_m))
+    assert np.abs(found[:2] - right[:2]).max() < 1e-9
+    assert np.abs(found[2] - right[2]).max() < 1e-4

@@ -217,6 +217,12 @@ def test_a_step_that_is_no_whole_number_of_codes_has_no_more_missing_than_are_lo
     assert scan.missing == lost
 
 
+@pytest.mark.parametrize("angles", [[0, 3, 9], [0, 3, 9, 15, 18]])
+def test_of_steps_half_of_which_are_twice_as_long_the_shorter_is_the_usual_one(angles: list[float]) -> None:
+    (scan,) = Sweeps().feed(radials(angles)).finish()
+    assert scan.missing == len(angles) // 2
+
+
 @pytest.mark.parametrize("codes", [2, 3])
 def test_a_retreat_of_more_than_one_code_is_a_turn(codes: int) -> None:
     scans = Sweeps().feed(radials([0, 1, 2, 3, 3 - codes * LSB, 3 - 2 * codes * LSB])).finish()
