@@ -24,7 +24,7 @@ def warm_up(monitor: Monitor) -> None:
     for quantity in NEEDED:
         values = np.full(2, middle.get(quantity.name, 0.0))
         aircraft.tracks[quantity.name].append(times, values, np.zeros(2, np.uint8))
-    angles = np.arange(-9.0, 10.0, 3.0)
+    angles = np.tile(np.arange(-9.0, 10.0, 3.0), 4)  # the ends of the third sweep are compared with the second's
     n = len(angles)
     radials = unpack(np.zeros((n, WORD_708_BYTES), np.uint8))._replace(
         scan_angle_deg=angles,
@@ -36,4 +36,4 @@ def warm_up(monitor: Monitor) -> None:
     builder = ScanBuilder()
     scans = [*builder.feed(np.full(n, SECOND_NS // 20), radials), *builder.finish()]
     settings = monitor.settings.model_copy(update={"minimum_pairs": 2, "position_gate": False})
-    Monitor(monitor.terrain, settings).judge(scans[0], aircraft)
+    Monitor(monitor.terrain, settings).judge(scans[-1], aircraft)
