@@ -1,7 +1,4 @@
-"""The loop over the packets of a byte stream, compiled; `decoders.racklink` says what it does with the rest.
-
-CRC-32 is that of IEEE 802.3, eight bytes at a time with a table for each (Kounavis and Berry, 2005).
-"""
+"""The loop over the packets of a byte stream, compiled; `decoders.racklink` says what it does with the rest."""
 
 import zlib
 from typing import Any, Final
@@ -11,6 +8,7 @@ import numpy.typing as npt
 from numba import njit
 
 from decoders import formats as f
+from decoders.kernels_crc import crc32, word
 
 Bytes = npt.NDArray[np.uint8]
 Array = npt.NDArray[Any]
@@ -18,93 +16,84 @@ Int = Any  # of whatever width the loop has
 
 SHORTEST: Final = f.LINK_HEADER_BYTES + f.LINK_CRC_BYTES
 LONGEST: Final = f.LINK_MAX_BYTES
+LONGEST_ENCODED: Final = f.LINK_MAX_ENCODED_BYTES
 VERSION: Final = f.LINK_VERSION
 CRC_RESIDUE: Final = zlib.crc32(bytes(f.LINK_CRC_BYTES))  # of all bytes that end with their CRC; that of none is 0
-REFLECTED: Final = 0xEDB88320
 FULL_GROUP: Final = 255  # a COBS code after which no zero is left out
-
-
-def _tables() -> npt.NDArray[np.uint32]:
-    """(8, 256): what a byte adds to the CRC, seven to none bytes further on."""
-    rows = np.zeros((8, 256), np.uint32)
-    for byte in range(256):
-        crc = byte
-        for _ in range(8):
-            crc = crc >> 1 ^ REFLECTED * (crc & 1)
-        rows[0, byte] = crc
-    for k in range(1, 8):
-        rows[k] = rows[k - 1] >> np.uint32(8) ^ rows[0, rows[k - 1] & 255]
-    return rows
-
-
-TABLES: Final = _tables()
+LOWS: Final = 0x0101010101010101  # of each byte of a word, the lowest bit
+HIGHS: Final = 0x8080808080808080
 
 
 @njit(cache=True)
-def intact(data: Bytes, at: int, tables: Array, decoded: Bytes, found: Array, count: int) -> tuple[int, int]:
+def intact(data: Bytes, at: int, decoded: Bytes, found: Array, count: int) -> tuple[int, int]:
     """Take packets from data[at:] until one is not intact and of version 1, or not whole.
 
-    Writes them without COBS to `decoded` from where the packet before ended, and a row of start, size and the place
-    behind its closing zero in `data` each to `found` i8 (m, 3). Gives the new count, and where it stopped.
+    `decoded` is a copy of `data`, in which packets lose their COBS where they lie; a row of start and size there and
+    the place behind the closing zero goes to `found` i8 (m, 3) for each. Gives the new count, and where it stopped.
     """
-    to = found[count - 1, 0] + found[count - 1, 1] if count else 0
     while count < found.shape[0]:
-        size, end = _unstuffed(data, at, decoded, to)
+        end = _closing_zero(data, at)
+        if end == data.size or end - at > LONGEST_ENCODED:
+            break
+        start = _unstuffed(data, at, end, decoded)
+        size = end - start
         if (
             size < SHORTEST
             or size > LONGEST
-            or decoded[to] != VERSION
-            or crc32(decoded, to, to + size, tables) != CRC_RESIDUE
+            or decoded[start] != VERSION
+            or crc32(decoded, start, end, 0) != CRC_RESIDUE
         ):
             break
-        found[count] = to, size, end
+        at = end + 1
+        found[count] = start, size, at
         count += 1
-        to += size
-        at = end
     return count, at
 
 
 @njit(cache=True)
-def _unstuffed(data: Bytes, at: Int, decoded: Bytes, to: Int) -> tuple[Int, Int]:
-    """Decode one run; its size, 0 if it is not sound or not whole, and the place behind its closing zero."""
-    begin = to
-    while at < data.size:
-        code = np.int64(data[at])
-        if code == 0:
-            return to - begin, at + 1
-        if at + code >= data.size:  # at least a closing zero must follow
-            break
-        for k in range(1, code):
-            byte = data[at + k]
-            if byte == 0:
-                return 0, at
-            decoded[to] = byte
-            to += 1
-        at += code
-        if code < FULL_GROUP and data[at] != 0:
-            decoded[to] = 0
-            to += 1
-    return 0, at
+def described(decoded: Bytes, found: Array, ends: Array, header: Array, chunk: Array) -> None:
+    """Of each packet in `found`, the 16 bytes of its header, as `header` u8 (m, 2), and which chunk completes it.
+
+    `ends` are the places where the chunks end.
+    """
+    k = 0
+    for i in range(found.shape[0]):
+        while ends[k] < found[i, 2]:
+            k += 1
+        chunk[i] = k
+        start = np.uint64(found[i, 0])
+        header[i, 0], header[i, 1] = word(decoded, start), word(decoded, start + np.uint64(8))
 
 
 @njit(cache=True)
-def crc32(data: Bytes, start: Int, end: Int, tables: Array) -> Int:
-    """The CRC-32 of data[start:end]."""
-    crc = np.uint32(0xFFFFFFFF)
-    at = start
-    while end - at >= 8:
-        crc = (
-            tables[7, (crc & 255) ^ data[at]]
-            ^ tables[6, (crc >> 8 & 255) ^ data[at + 1]]
-            ^ tables[5, (crc >> 16 & 255) ^ data[at + 2]]
-            ^ tables[4, (crc >> 24) ^ data[at + 3]]
-            ^ tables[3, data[at + 4]]
-            ^ tables[2, data[at + 5]]
-            ^ tables[1, data[at + 6]]
-            ^ tables[0, data[at + 7]]
-        )
-        at += 8
-    while at < end:
-        crc = tables[0, (crc & 255) ^ data[at]] ^ (crc >> 8)
-        at += 1
-    return crc ^ np.uint32(0xFFFFFFFF)
+def _closing_zero(data: Bytes, start: Int) -> Int:
+    """Where the first zero from `start` on is, or the end; it is sought in eight bytes at once (Mycroft, 1987)."""
+    at, size = np.uint64(start), np.uint64(data.size)
+    while at + np.uint64(8) <= size:
+        eight = word(data, at)
+        if (eight - np.uint64(LOWS)) & ~eight & np.uint64(HIGHS):
+            break
+        at += np.uint64(8)
+    while at < size and data[at]:
+        at += np.uint64(1)
+    return np.int64(at)
+
+
+@njit(cache=True)
+def _unstuffed(data: Bytes, begin: Int, end: Int, decoded: Bytes) -> Int:
+    """Decode the run data[begin:end]; where it begins then, or `end` if it is not sound.
+
+    It lies there but for its codes: most become the zero that they stand for, and the first one, as any behind a full
+    group, stands for none: what is before it moves up.
+    """
+    start, at, stop, code = begin, np.uint64(begin), np.uint64(end), np.uint64(FULL_GROUP)
+    while at < stop:
+        if code == FULL_GROUP:
+            for k in range(np.int64(at), start, -1):
+                decoded[k] = decoded[k - 1]
+            start += 1
+        else:
+            decoded[at] = 0
+        code = np.uint64(data[at])
+        at += code
+    return start if at == stop else end

@@ -18,7 +18,7 @@ from cobs import cobs
 from decoders import formats as f
 from decoders.framing import HEADER, Packet, PacketFramer, Packets
 from decoders.kernels429 import entries
-from decoders.kernels_link import CRC_RESIDUE, TABLES, intact
+from decoders.kernels_link import CRC_RESIDUE, described, intact
 
 __all__ = [
     "ChannelCount",
@@ -137,32 +137,33 @@ class Framer(PacketFramer):
         decoded, found, _ = self._unstuff([data])
         if not len(found):
             return []
-        whole, new = decoded[: found[-1, 0] + found[-1, 1]].tobytes(), tuple.__new__
+        whole, new = decoded.tobytes(), tuple.__new__
         return [new(Packet, _fields(size)(whole, begin)) for begin, size, _ in found.tolist()]
 
     def frame(self, chunks: Sequence[bytes]) -> Packets:
         """Packets completed by the next chunks of a stream."""
         decoded, found, carried = self._unstuff(chunks)
-        begin, size, end = found.T
-        header = decoded[begin[:, np.newaxis] + np.arange(f.LINK_HEADER_BYTES)].view(HEADER)[:, 0]
-        chunk = np.searchsorted(np.cumsum([len(chunk) for chunk in chunks]), end - carried)
-        return Packets(header, begin + f.LINK_HEADER_BYTES, size - SHORTEST, chunk, decoded)
+        header, chunk = np.empty(len(found), HEADER), np.empty(len(found), np.int64)
+        ends = np.fromiter(map(len, chunks), np.int64, len(chunks)).cumsum()
+        described(decoded, found, ends + carried, header.view(np.uint64).reshape(-1, 2), chunk)
+        return Packets(header, found[:, 0] + f.LINK_HEADER_BYTES, found[:, 1] - SHORTEST, chunk, decoded)
 
     def _unstuff(self, chunks: Sequence[bytes]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64], int]:
-        """Packets without COBS, one behind the other; of each (n, 3) start, size, and the place behind it as fed.
+        """A copy of the stream in which packets lie without COBS; of each (n, 3) start, size, and the place behind it.
 
         And how many bytes of earlier chunks come before these. A compiled loop takes intact runs, which nearly all are.
         """
-        carried = b"" if self._overlong else bytes(self._run)
+        carried = bytes(self._run)
         stream = b"".join([carried, *chunks])
         self.received += len(stream) - len(carried)
-        if carried:
+        at = len(carried) if self._overlong else 0
+        if not self._overlong:
             self._run.clear()
-        data, decoded = np.frombuffer(stream, np.uint8), np.empty(len(stream) + LONGEST, np.uint8)
-        found, count, at = np.empty((len(stream) // (SHORTEST + 2) + 1, 3), np.int64), 0, 0
+        data, decoded = np.frombuffer(stream, np.uint8), np.frombuffer(bytearray(stream), np.uint8)
+        found, count = np.empty((len(stream) // (SHORTEST + 2) + 1, 3), np.int64), 0
         while True:
             if not self._overlong:
-                count, stopped = intact(data, at, TABLES, decoded, found, count)
+                count, stopped = intact(data, at, decoded, found, count)
                 self.framed += stopped - at
                 at = stopped
             end = stream.find(0, at)
@@ -170,9 +171,9 @@ class Framer(PacketFramer):
                 break
             for packet in self._close(stream[at:end]):
                 whole = np.frombuffer(struct.pack(f.LINK_HEADER, VERSION, *packet[:-1]) + packet.body, np.uint8)
-                to = found[count - 1, :2].sum() if count else 0
-                decoded[to : to + len(whole)] = whole
-                found[count] = to, len(whole) + f.LINK_CRC_BYTES, end + 1
+                size = len(whole) + f.LINK_CRC_BYTES
+                decoded[end - size : end - f.LINK_CRC_BYTES] = whole
+                found[count] = end - size, size, end + 1
                 count += 1
             at = end + 1
         self._extend(stream[at:])

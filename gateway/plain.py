@@ -71,24 +71,28 @@ def framed(links: Sequence[Link], records: Sequence[Raw]) -> Batch:
     if not records:
         return Batch(columns([], []), *np.empty((3, 0), np.int64))
     numbers = {link.config.name: number for number, link in enumerate(links)}
-    of_link = np.array([numbers[record.adapter] for record in records])
+    _, stamps, adapters, chunks, _ = zip(*records, strict=True)
     parts, link, record, base = [], [], [], 0
-    for number in np.unique(of_link):
-        own = np.flatnonzero(of_link == number)
-        part = links[number].framer.frame([records[k].data for k in own.tolist()])
+    for adapter in dict.fromkeys(adapters):
+        own = [k for k, other in enumerate(adapters) if other == adapter]
+        part = links[numbers[adapter]].framer.frame([chunks[k] for k in own])
         parts.append(part._replace(start=part.start + base))
-        link.append(np.full(len(part.header), number))
-        record.append(own[part.chunk])
+        link.append(np.full(len(part.header), numbers[adapter]))
+        record.append(np.array(own)[part.chunk])
         base += len(part.data)
-    header, start, size, chunk, data = (np.concatenate(column) for column in zip(*parts, strict=True))
-    packets = Packets(header, start, size, chunk, data)
-    links_of, records_of = np.concatenate(link), np.concatenate(record)
+    packets = Packets(*map(_joined, zip(*parts, strict=True)))
+    links_of, records_of = _joined(link), _joined(record)
     if len(parts) > 1:
         order = np.argsort(records_of, kind="stable")
         links_of, records_of = links_of[order], records_of[order]
         packets = packets.of(order)
-    host_ns = np.array([one.stamp.monotonic_ns for one in records], np.int64)[records_of]
+    host_ns = np.array([monotonic_ns for monotonic_ns, _ in stamps], np.int64)[records_of]
     return Batch(packets, links_of, records_of, host_ns)
+
+
+def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Arrays one behind the other; of one alone no copy is made."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 @njit(cache=True)
@@ -134,7 +138,9 @@ def gathered(data: NDArray[np.uint8], start: NDArray[np.int64], size: NDArray[np
     out = np.empty(size.sum(), np.uint8)
     to = 0
     for i in range(start.size):
-        out[to : to + size[i]] = data[start[i] : start[i] + size[i]]
+        piece, place = data[start[i] : start[i] + size[i]], out[to : to + size[i]]
+        for k in range(piece.size):  # assigned as a whole they would be looked at for overlap, which takes longer
+            place[k] = piece[k]
         to += size[i]
     return out
 

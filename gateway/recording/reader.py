@@ -7,18 +7,21 @@ given up on cheap signs first, and what may be spent on CRCs there grows with th
 
 import re
 import struct
-import zlib
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from itertools import chain, repeat
+from operator import length_hint
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
+from gateway.recording.kernels import CHANNELS, COLUMNS, KNOWN, MESSAGE, RAW_BYTES, raw_records
 from gateway.recording.layout import (
     LARGEST_RECORD,
     MAGIC,
     PROFILE,
-    RAW_HEAD,
     DamagedRecord,
     Topic,
     parse_channel,
@@ -28,15 +31,13 @@ from gateway.recording.layout import (
 from gateway.recording.window import Window
 from gateway.records import Raw, Record, Stamp
 
+AT_ONCE = 4096  # raw records
 KEPT_PLACES = 100  # of the damaged places; the others are counted
 SPENT_PER_BYTE = 16  # bytes of CRC for each byte passed over
 LARGEST_DESCRIPTION = 4 << 20  # of channels, metadata and JSON
-HEADER, CHANNEL, MESSAGE, METADATA, DATA_END = 1, 4, 5, 12, 15
+HEADER, CHANNEL, METADATA, DATA_END = 1, 4, 12, 15
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
-_RAW = struct.Struct("<BQHIQQIQQQI")  # and CRC-32, sequence, monotonic_ns, utc_ns, dropped_before
-_SMALLEST_RAW = _RAW.size - _RECORD.size
-_BODY = _MESSAGE.size + 4  # what a raw payload's CRC covers begins here, counted from its record
 _NAME = struct.pack("<I", len(PROFILE)) + PROFILE.encode()
 OPENING = MAGIC + _RECORD.pack(HEADER, 2 * len(_NAME)) + 2 * _NAME
 _MESSAGES = rb"\x05.{3}\x00{5}.{6}(.{8})\1"  # a length of 24 bits, and two times that are the same
@@ -88,17 +89,25 @@ class FileReader:
         self._window = window
         self._found = found
         self._topics: dict[int, Topic] = {}
-        self._raw: dict[int, tuple[str, int]] = {}  # of raw channels: the adapter, and what their CRCs begin with
+        self._adapters: dict[int, str] = {}  # of raw channels
+        self._seeds = np.zeros(CHANNELS, np.int64)
+        self._columns = np.empty((COLUMNS, AT_ONCE), np.uint64)
         self._last: Stamp | None = None
         self._tail: int | None = None if window.closed else window.size  # where a torn end begins
 
     def records(self) -> Iterator[Record]:
         """Every whole record; damaged places and a torn end go to the findings."""
+        return chain.from_iterable(self._runs())
+
+    def _runs(self) -> Iterator[Iterable[Record]]:
+        """The same in runs, which cost no call for each record."""
         window, found = self._window, self._found
         before = found.records
         at = len(OPENING) if self.begins_as_ours else self._skip(0, DamagedRecord("no recording begins here"))
+        loaded = False
         while at < window.end:
-            at = yield from self._raw_records(at)
+            if loaded:
+                at = yield from self._raw_records(at)
             if at == window.end:
                 break
             try:
@@ -110,53 +119,33 @@ class FileReader:
             if record is not None:
                 found.records += 1
                 self._last = record.stamp
-                yield record
+                loaded |= isinstance(record, Raw)  # who looks for one only shall not wait for the compiled loop
+                yield (record,)
         if self._tail is not None:
             found.torn.append((self._path, self._torn(found.records - before, window.size - self._tail)))
 
-    def _raw_records(self, at: int) -> Generator[Record, None, int]:
+    def _raw_records(self, at: int) -> Generator[Iterable[Record], None, int]:
         """Raw records as long as they lie whole in the window one behind the other; where that ends."""
-        data, base, size = self._window.data, self._window.base, len(self._window.data)
-        unpack, crc32, new, kinds = _RAW.unpack_from, zlib.crc32, tuple.__new__, self._raw
-        place, count, stamp = at - base, 0, self._last
+        data, base, new = self._window.data, self._window.base, tuple.__new__
+        count, stopped = raw_records(np.frombuffer(data, np.uint8), at - base, self._seeds, self._columns)
+        numbers, monotonic_ns, utc_ns, dropped, channels, begins, ends = self._columns[:, :count].tolist()
+        stamps = map(new, repeat(Stamp), zip(monotonic_ns, utc_ns, strict=True))
+        adapters = map(self._adapters.__getitem__, channels)
+        chunks = map(data.__getitem__, map(slice, begins, ends))
+        left = iter(numbers)
         try:
-            while True:
-                try:
-                    (
-                        opcode,
-                        length,
-                        channel,
-                        low,
-                        log_ns,
-                        published_ns,
-                        crc,
-                        sequence,
-                        monotonic_ns,
-                        utc_ns,
-                        dropped,
-                    ) = unpack(data, place)
-                    adapter, seed = kinds[channel]
-                except (struct.error, KeyError):
-                    break
-                end = place + _RECORD.size + length
-                if opcode != MESSAGE or end > size or length < _SMALLEST_RAW or low != sequence & 0xFFFFFFFF:
-                    break
-                if not log_ns == published_ns == utc_ns:
-                    break
-                body = data[place + _BODY : end]
-                if crc32(body, seed) != crc:
-                    break
-                stamp = new(Stamp, (monotonic_ns, utc_ns))
-                count += 1
-                place = end
-                yield new(Raw, (sequence, stamp, adapter, body[RAW_HEAD.size :], dropped))
+            yield map(new, repeat(Raw), zip(left, stamps, adapters, chunks, dropped, strict=True))
         finally:
-            self._found.records += count
-            self._last = stamp
-        return base + place
+            if given := count - length_hint(left):
+                self._found.records += given
+                self._last = Stamp(monotonic_ns[given - 1], utc_ns[given - 1])
+        return base + stopped
 
     def _whole(self, at: int) -> tuple[int, Record | None]:
-        """The end of the MCAP record at an offset, and what it records. Raises DamagedRecord if it is not whole."""
+        """The end of the MCAP record at an offset, and what it records. Raises DamagedRecord if it is not whole.
+
+        The window is never asked for less than from that offset on, which may have to be looked at again.
+        """
         window = self._window
         head = window.get(at, _RECORD.size)
         if len(head) < _RECORD.size:
@@ -167,12 +156,13 @@ class FileReader:
             raise Implausible("the length of a record is wrong")
         if opcode == MESSAGE:
             return end, self._message(at, length)
-        content = window.get(at + _RECORD.size, min(length, LARGEST_DESCRIPTION))
+        content = window.get(at, _RECORD.size + min(length, LARGEST_DESCRIPTION))[_RECORD.size :]
         if opcode == CHANNEL:
             number, topic = parse_channel(content)
             self._topics[number] = topic
             if topic.adapter is not None:
-                self._raw[number] = topic.adapter, topic.seed
+                self._adapters[number] = topic.adapter
+                self._seeds[number] = KNOWN | topic.seed
         elif opcode == METADATA:
             self.metadata = parse_metadata(content)
         elif opcode == DATA_END and content == bytes(4):
@@ -195,9 +185,9 @@ class FileReader:
         if topic.adapter is None:
             if size > LARGEST_DESCRIPTION:
                 raise Implausible("a message is too long")
-        elif (fields := self._window.get(at, _RAW.size))[-12:-4] != head[-8:] or fields[35:39] != head[11:15]:
+        elif (fields := self._window.get(at, RAW_BYTES))[-12:-4] != head[-8:] or fields[35:39] != head[11:15]:
             raise Implausible("the header of a raw chunk says another time or sequence than the chunk")
-        record = parse_payload(topic, self._window.get(at + _MESSAGE.size, size))
+        record = parse_payload(topic, self._window.get(at, _MESSAGE.size + size)[_MESSAGE.size :])
         if (record.sequence & 0xFFFFFFFF, record.stamp.utc_ns) != (low, log_ns):
             raise DamagedRecord("the header of a message says another time or sequence than the message")
         return record

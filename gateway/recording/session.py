@@ -2,14 +2,16 @@
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 from gateway.errors import GatewayError
 from gateway.recording.layout import FORMAT_KEY, LAYOUTS, MAGIC
 from gateway.recording.reader import OPENING, Damage, FileReader, Findings
-from gateway.recording.window import BLOCK, Window
+from gateway.recording.window import Window
 from gateway.records import Record
 
+FOR_METADATA = 1 << 20  # of the beginning of a file
 _FOLLOWER = re.compile(r"(.+)\.(\d{4,})")
 
 
@@ -55,8 +57,7 @@ class Recording:
 
     def __iter__(self) -> Iterator[Record]:
         self._found = found = Findings()
-        for path in self.files:
-            yield from read_file(path, found)
+        return chain.from_iterable(read_file(path, found) for path in self.files)
 
 
 def read_file(path: Path, found: Findings) -> Iterator[Record]:
@@ -68,7 +69,7 @@ def read_file(path: Path, found: Findings) -> Iterator[Record]:
 def metadata_of(path: Path) -> dict[str, str]:
     """What a file says of itself. Raises GatewayError if it is no recording, or of a format that we do not know."""
     with Window(path) as window:
-        window.end = min(window.end, BLOCK)
+        window.end = min(window.end, FOR_METADATA)
         opening = window.get(0, len(OPENING))
         reader = FileReader(path, window, Findings())
         next(reader.records(), None)

@@ -11,7 +11,7 @@ from typing import Self
 from gateway.errors import GatewayError
 from gateway.recording.layout import MAGIC
 
-BLOCK = 1 << 20
+BLOCK = 1 << 19  # with what is made of it, it stays in a core's cache
 MOST_INDEX = 4 << 20  # of a channel or two for every adapter there could be
 _FOOTER = struct.Struct("<BQQQI8s")  # opcode, length, where the summary begins, and its offsets, CRC-32, magic
 _FOOTER_OPCODE, _FOOTER_LENGTH = 2, 20

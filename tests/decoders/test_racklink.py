@@ -8,14 +8,12 @@ from functools import cache
 from itertools import pairwise
 from subprocess import run
 
-import numpy as np
 import pytest
 from cobs import cobs
 from hypothesis import given
 from hypothesis import strategies as st
 
 from decoders import layouts
-from decoders.kernels_link import TABLES, crc32
 from decoders.racklink import (
     MOST_STARTS,
     ChannelCount,
@@ -122,10 +120,44 @@ def test_chunks_framed_many_at_once_are_those_framed_one_by_one(
     assert (found, at_once.counters()) == (fed, one_by_one.counters())
 
 
-@given(st.binary(max_size=300))
-def test_the_compiled_checksum_is_zlib_s(data: bytes) -> None:
-    array = np.frombuffer(data, np.uint8)
-    assert crc32(array, 0, len(array), TABLES) == zlib.crc32(data)
+@pytest.mark.parametrize("size", [253, 254, 255, 507, 508, 509, 2000])
+def test_runs_without_a_zero_of_any_length_lose_their_cobs_in_the_compiled_loop(
+    size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(Framer, "_close")  # which takes what that loop leaves
+    body = bytes(1 + k % 255 for k in range(size))
+    for sent in (body, b"\0" + body, body + b"\0", body[:-1] + b"\0" + body):
+        packets, _ = fed([frame(packet_bytes(sent, sequence=3)), GOOD_FRAME])
+        assert packets == [GOOD._replace(body=sent), GOOD]
+
+
+def test_an_empty_group_behind_a_full_one_stands_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(Framer, "_close")
+    # 254 bytes before the end: some encoders close the full group, 0xff, with a code of its own for no bytes.
+    packet = next(p for k in range(256) if 0 not in (p := _without_zero(k)))
+    run = b"\xff" + packet
+    assert cobs.decode(run) == cobs.decode(run + b"\1") == packet
+    framer = Framer()
+    assert [found.body for found in framer.feed(run + b"\0" + run + b"\1\0")] == [packet[16:-4]] * 2
+
+
+def _without_zero(k: int) -> bytes:
+    """A packet of 254 bytes that has no zero but perhaps in its CRC."""
+    packet = b"\1\x10\7\x12" + bytes([1, 1, 1, 1, *8 * [1]]) + bytes(233 * [7]) + bytes([k or 1])
+    return packet + zlib.crc32(packet).to_bytes(4, "little")
+
+
+@pytest.mark.parametrize("chunks", [[b"\0"], [b"", b"", b"\0"], [b"", b"\0" + GOOD_FRAME]])
+def test_a_packet_at_the_end_of_an_overlong_run_comes_with_the_chunk_that_closes_it(chunks: list[bytes]) -> None:
+    large = GOOD._replace(body=bytes(range(256)) * 15)
+    began = b"\xaa" * 9000 + frame(packet_bytes(large.body, sequence=3))[:-1]
+    many, single = Framer(), Framer()
+    many.frame([began])
+    single.feed(began)
+    found, expected = many.frame(chunks), [(p, k) for k, chunk in enumerate(chunks) for p in single.feed(chunk)]
+    assert [(found.packet(k), found.chunk[k]) for k in range(len(found.header))] == expected
+    assert many.counters() == single.counters()
+    assert many.counters()["oversize"] == 1 and expected[0][0] == large
 
 
 @given(st.lists(BODIES, max_size=2), GARBAGE)
