@@ -32,7 +32,7 @@ from simulators.scenario import BUILT_IN_TERRAIN, white_mountains
 
 SECONDS = 120
 AN_HOUR = 3600 // SECONDS
-HOURS = (1, 4, 16)
+HOURS = (1, 4)
 CHUNK_NS = 10_000_000
 SECOND_NS = 1_000_000_000
 WORD_NS = f.WORD_429_BIT_TIMES * f.HIGH_SPEED_BIT_NS

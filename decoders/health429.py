@@ -81,11 +81,12 @@ class BusHealth:
                 self._second_ns = int(time_ns[start])
                 self._rates = _Rates.none()
                 self._words = -1  # its first word opens the second and is not of it
-            block = time_ns, words, values.label, values.status
+            block = time_ns, words, values.label, values.value, values.status
             sets, tallies = (self.has_sdi, self._is_known, TURNED), (self._sources, self._known, *self._rates)
-            end, whole, named = kernels.tally(start, self._second_ns + SECOND_NS, *block, *sets, *tallies)
+            limits = start, self._second_ns + SECOND_NS, self._definitions.equipment_id & 0xFF
+            end, whole, right, wrong = kernels.tally(*limits, *block, *sets, *tallies)
             self._words += end - start
-            if named:
+            if wrong or (right and "equipment" in self._wrong):
                 yield from self._equipment(values, slice(start, end))
             if whole:
                 yield from self._judge(int(time_ns[end - 1]))

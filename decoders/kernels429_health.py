@@ -23,34 +23,23 @@ OFTEN: Final = 3  # words of a label before its silence means anything: a damage
 
 @njit(cache=True)
 def tally(  # type: ignore[no-untyped-def] # typed by health429
-    start,
-    until_ns,
-    time_ns,
-    words,
-    label,
-    status,
-    has_sdi,
-    is_known,
-    turned,
-    sources,
-    read,
-    first_ns,
-    last_ns,
-    lately,
-    ever,
-):
+    start, until_ns, equipment, time_ns, words, label, value, status, has_sdi, is_known, turned,
+    sources, read, first_ns, last_ns, lately, ever,
+):  # fmt: skip
     """Count decoded words in rising time by label (256,) and by source (256, 4), from one on to the first after a time.
 
     Adds to `read` how many have a good parity, and a bad one, and of the good how many have a known label, as they are
-    and if turned round. Gives where it stopped, whether that was for the time, and how many words name the equipment.
+    and if turned round. Gives where it stopped, whether that was for the time, and how many words say rightly, and how
+    many wrongly, which equipment sends.
     """
-    end, whole, named, before = start, False, 0, ever.copy()
+    end, whole, said, before = start, False, np.zeros(2, np.int64), ever.copy()
     while end < words.size and not whole:
         of = label[end]
         if status[end] != BAD_PARITY:
             if has_sdi[of]:
                 sources[of, words[end] >> 8 & 3] = True
-            named += of == EQUIPMENT and status[end] == NORMAL
+            if of == EQUIPMENT and status[end] == NORMAL:
+                said[0 if int(value[end]) & 0xFF == equipment else 1] += 1
             if not ever[of]:
                 first_ns[of] = time_ns[end]
             last_ns[of] = time_ns[end]
@@ -64,7 +53,7 @@ def tally(  # type: ignore[no-untyped-def] # typed by health429
         read[2] += count * is_known[of]
         read[3] += count * is_known[turned[of]]
     read[1] += end - start - (ever - before).sum()
-    return end, whole, named
+    return end, whole, said[0], said[1]
 
 
 @njit(cache=True)

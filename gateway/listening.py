@@ -7,6 +7,7 @@ called as soon as one may end its sweep.
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,8 @@ from gateway.plain import (
 from gateway.records import Raw
 from gateway.telling import Telling
 from gateway.timebase import Timebase
-from gateway.waiting import MOST_RADIALS, WaitingRadials, WaitingWords
+from gateway.waiting import LONGEST_WAIT_NS, MOST_RADIALS, WAIT_NS, WaitingRadials, WaitingWords
+from monitor.quantities import are_distinct
 
 Place = tuple[str, int]  # adapter and channel
 WORTH_WHILE = 16  # packets: fewer are taken sooner one by one
@@ -48,6 +50,8 @@ class Listener:
         read: Callable[[], None],
         read_sweep: Callable[[], None],
         began_anew: Callable[[str, int], None],
+        *,
+        patient: bool = False,
     ) -> None:
         profile = profile_of(config.radar_profile)
         self.links = {a.name: Link(a, profile) for a in config.adapters}
@@ -62,6 +66,8 @@ class Listener:
         self._read = read
         self._read_sweep = read_sweep
         self._began_anew = began_anew
+        # The height of the geoid is looked up at the newest position, so words that need it must be read by the second.
+        self._patient = patient and config.monitor.height_source == "076"
         self._users: dict[str, tuple[Place, int]] = {}  # by role, and when last heard
         self._unused: dict[Place, str] = {}  # why a channel is not used, told already
 
@@ -74,6 +80,20 @@ class Listener:
             self.links[adapter].counters["words_429_unused"] += len(waiting)
         if before.radials.link:
             self.links[before.radials.link.config.name].counters["words_708_unused"] += len(before.radials)
+
+    @property
+    def patient(self) -> bool:
+        """Whether words may wait for the end of a scan, because nobody asks for the state before.
+
+        Where two channels give the same quantity it matters which of them was read first.
+        """
+        equipment = (
+            channel.definitions.equipment_id & 0xFF
+            for link in self.links.values()
+            for channel in link.channels.values()
+            if isinstance(channel, Channel429)
+        )
+        return self._patient and are_distinct(tuple(equipment))
 
     def take(self, record: Raw) -> None:
         """Take a chunk."""
@@ -94,7 +114,7 @@ class Listener:
 
     def take_all(self, records: Sequence[Raw], batch: Batch) -> None:
         """Take chunks and their packets: the same as one by one, and sooner."""
-        for name, count in Counter(record.adapter for record in records).items():
+        for name, count in Counter(map(attrgetter("adapter"), records)).items():
             self.links[name].counters["chunks"] += count
         for name, record in {record.adapter: record for record in records}.items():  # the last of each
             self.hearing.bytes_came(name, record.stamp.monotonic_ns)
@@ -122,7 +142,7 @@ class Listener:
         header, start, size, _, data = batch.packets
         count = count_plain(
             header, start, size, data, batch.link, batch.host_ns, *ways, sequence, latest_ns,
-            clocks, reference, radials.watch.last, bits, room, offset_ns,
+            clocks, reference, radials.watch.last, bits, room, self._longest_wait_ns, offset_ns,
         )  # fmt: skip
         if not count:
             return 0
@@ -176,7 +196,7 @@ class Listener:
             link.counters["words_429"] += words
             self.hearing.heard(f"{link.config.name}/{number}", host_ns)
             bodies = gathered(data, start[here], sizes).tobytes()
-            waiting = self.words.setdefault((link.config.name, number), WaitingWords(channel))
+            waiting = self._waiting((link.config.name, number), channel)
             waiting.put(times_ns, sizes, bodies, offset_ns, end_ns)
         else:
             words = len(here)
@@ -185,6 +205,15 @@ class Listener:
             bodies = gathered(data, start[here] + COUNT_BYTES, sizes - COUNT_BYTES).tobytes()
             self.radials.put_all(link, channel, times_ns + offset_ns, bodies)
         link.books[number].arrived += words
+
+    @property
+    def _longest_wait_ns(self) -> int:
+        return LONGEST_WAIT_NS if self.patient else WAIT_NS
+
+    def _waiting(self, here: Place, channel: Channel429) -> WaitingWords:
+        if here not in self.words:
+            self.words[here] = WaitingWords(channel, self._longest_wait_ns)
+        return self.words[here]
 
     def _packet(self, link: Link, packet: Packet, record: Raw) -> None:
         """Take any packet."""
@@ -279,7 +308,7 @@ class Listener:
         overtakes = waiting and waiting.until_ns and not waiting.end_ns <= packet.time_ns < waiting.until_ns
         if overtakes or channel.is_panel:
             self._read()
-        waiting = self.words.setdefault(here, WaitingWords(channel))
+        waiting = self._waiting(here, channel)
         end_ns = packet.time_ns + int.from_bytes(packet.body[-8:-4], "little")
         waiting.put([packet.time_ns], [len(packet.body)], packet.body, [offset_ns], end_ns)
         if channel.is_panel:  # the radials before a command are compared with the one before it, those behind with it

@@ -1,14 +1,14 @@
 """Records to events: the one way through decoding and monitoring, live and in replay alike.
 
 Reads no clock: whatever depends on time depends on the stamps of the records, ticks included. Words wait until a scan
-ends or a tick passes, or a second of them has gathered, and are then decoded together.
+ends or a tick asks for the state, or a second of them has gathered, and are then decoded together.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import replace
-from itertools import groupby
 from operator import itemgetter
+from typing import cast
 
 import numpy as np
 
@@ -56,12 +56,15 @@ class Pipeline:
         self._watcher = watcher
         self._tells_state = tells_state
         self._telling: Telling = before._telling if before else Telling()
-        self.listener = Listener(config, self._telling, self._read, self._read_sweep, self._clock_began_anew)
+        self.listener = Listener(
+            config, self._telling, self._read, self._read_sweep, self._clock_began_anew, patient=not tells_state
+        )
         self.aircraft = Aircraft(config.monitor.height_source)
         self._scans = ScanBuilder()
         self._echo = ControlEcho(config.monitor.control_delay_s)
         self._counters: Counter[str] = Counter()
         self._doubted: set[str] = set()  # quantities whose words seem to be read in a wrong way, told already
+        self._owned_up: set[str] = set()  # and those that a verdict has named
         self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
         if before:
             self._counters = before._counters
@@ -74,32 +77,33 @@ class Pipeline:
         self._take(record)
         return self._telling.given()
 
-    def feed_all(self, records: Iterable[Record]) -> list[Event]:
+    def feed_all(self, records: Sequence[Record]) -> list[Event]:
         """The events that many records cause: the same as one by one, and sooner."""
-        for ahead, group in groupby(records, self._may_be_framed_ahead):
-            if ahead:
-                self._take_all([*group])
-            else:
-                for record in group:
-                    self._take(record)
+        # What was dropped before a chunk is owned up to by the next verdict and not by one before.
+        links = self.listener.links
+        alone = [
+            k for k, r in enumerate(records) if isinstance(r, Raw) and (r.dropped_before or r.adapter not in links)
+        ]
+        begin = 0
+        for end in (*alone, len(records)):
+            self._take_all(records[begin:end])
+            for record in records[end : end + 1]:
+                self._take(record)
+            begin = end + 1
         return self._telling.given()
 
-    def _may_be_framed_ahead(self, record: Record) -> bool:
-        # What was dropped before a record is owned up to by the next verdict and not by one before.
-        return not isinstance(record, Raw) or (not record.dropped_before and record.adapter in self.listener.links)
-
     def _take_all(self, records: Sequence[Record]) -> None:
-        chunks = [record for record in records if isinstance(record, Raw)]
-        batch = self.listener.framed(chunks)
-        begin = 0
-        for is_chunk, group in groupby(records, lambda record: isinstance(record, Raw)):
-            if is_chunk:
-                end = begin + sum(1 for _ in group)
-                self.listener.take_all(chunks[begin:end], batch.of_records(begin, end))
-                begin = end
-            else:
-                for record in group:
-                    self._take(record)
+        """Take records whose chunks may be framed together."""
+        batch = self.listener.framed([record for record in records if isinstance(record, Raw)])
+        begin = chunks = 0
+        for end in (*(k for k, record in enumerate(records) if not isinstance(record, Raw)), len(records)):
+            if end > begin:
+                some = cast(Sequence[Raw], records[begin:end])
+                self.listener.take_all(some, batch.of_records(chunks, chunks + len(some)))
+                chunks += len(some)
+            for record in records[end : end + 1]:
+                self._take(record)
+            begin = end + 1
 
     def _take(self, record: Record) -> None:
         self._telling.begin(record)
@@ -228,6 +232,10 @@ class Pipeline:
             if self._monitor is None:
                 continue
             verdict, comparison = self._monitor.judge(scan, self.aircraft)
+            for quantity, doubt in self.aircraft.doubts().items():
+                if quantity not in self._owned_up:
+                    self._owned_up.add(quantity)
+                    self._troubles[quantity] = f"degraded: {quantity}: {doubt}"
             losses = [loss for link in self.listener.links.values() for loss in link.take_losses()]
             verdict = replace(verdict, reasons=(*verdict.reasons, *self._troubles.values(), *losses))
             self._troubles.clear()
@@ -243,20 +251,24 @@ class Pipeline:
 
     def _tick(self, record: Tick) -> None:
         now_ns, hearing = record.stamp.monotonic_ns, self.listener.hearing
-        self._read()
-        if hearing.silent_ns(RADAR, now_ns) > SILENCE_NS:
+        silent = hearing.silent_ns(RADAR, now_ns) > SILENCE_NS
+        if silent or not self.listener.patient:
+            self._read()
+        if silent:
             self._judge(self._scans.finish())
         for source, reason in hearing.fell_silent(now_ns):
             self._telling.tell(source, "QUIET", reason)
             if source == RADAR and self._monitor:
                 self._say(self._monitor.unavailable(self._scans.skip(), [f"radar: {reason}"]), self._monitor)
+        if self._tells_state:
+            self._tell_doubts()
+            self._telling.say(self._state(record))
+
+    def _tell_doubts(self) -> None:
         for quantity, doubt in self.aircraft.doubts().items():
             if quantity not in self._doubted:
                 self._doubted.add(quantity)
-                self._troubles[quantity] = f"degraded: {quantity}: {doubt}"
                 self._telling.tell(quantity, "STATE_DOUBT", doubt)
-        if self._tells_state:
-            self._telling.say(self._state(record))
 
     def _state(self, record: Tick) -> StateEvent:
         heard_ns = self.listener.now_host_ns
@@ -276,3 +288,8 @@ class Pipeline:
         values["utc_s"] = None if utc.utc_ns is None else utc.utc_ns / 1e9
         validity["utc_s"] = utc.validity
         return StateEvent(*self._telling.stamp, values, validity, age_s)
+
+
+def _stands_alone(record: Record, links: Container[str]) -> bool:
+    """What was dropped before a chunk is owned up to by the next verdict, and not by one before."""
+    return isinstance(record, Raw) and (record.dropped_before > 0 or record.adapter not in links)

@@ -18,7 +18,6 @@ from decoders.racklink import ENTRY_429
 from gateway.link import GOES_BACK_NS, SEQUENCE_RANGE, Link
 from gateway.records import Raw
 from gateway.timebase import begins_anew, follow
-from gateway.waiting import LONGEST_WAIT_NS
 from monitor import scans
 
 LATEST_DEVICE_NS: Final = 1 << 62  # far beyond any clock, and far from overflow
@@ -98,7 +97,7 @@ def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
 @njit(cache=True)
 def count_plain(  # type: ignore[no-untyped-def] # typed by Listener
     header, start, size, data, link, host_ns, kind, end_ns, until_ns, sequence, latest_ns, clocks, reference, last,
-    radar_bits, room, offset_ns,
+    radar_bits, room, longest_wait_ns, offset_ns,
 ):  # fmt: skip
     """How many packets in front are plain. State as of the last of them is left in the arrays that came with it."""
     for i in range(header.size):
@@ -115,7 +114,7 @@ def count_plain(  # type: ignore[no-untyped-def] # typed by Listener
             if header[i].type != WORDS_429 or not whole or not end_ns[of, channel] <= time_ns < until_ns[of, channel]:
                 return i
             if until_ns[of, channel] == NEVER_NS:
-                until_ns[of, channel] = time_ns + LONGEST_WAIT_NS
+                until_ns[of, channel] = time_ns + longest_wait_ns
             end_ns[of, channel] = time_ns + _little(body, body.size - ENTRY_BYTES, 4)
         else:
             whole = body.size == COUNT_BYTES + (radar_bits + 7) // 8 and _little(body, 0, COUNT_BYTES) == radar_bits

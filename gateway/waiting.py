@@ -17,7 +17,8 @@ from monitor.scans import SweepWatch
 
 Numbers = Sequence[int] | NDArray[np.int64]
 
-LONGEST_WAIT_NS: Final = 1_000_000_000
+WAIT_NS: Final = 1_000_000_000
+LONGEST_WAIT_NS: Final = 10 * WAIT_NS  # where nobody asks before
 MOST_RADIALS: Final = 1024
 
 
@@ -33,8 +34,9 @@ class Radar(NamedTuple):
 class WaitingWords:
     """Packets of one ARINC 429 channel in order of time."""
 
-    def __init__(self, channel: Channel429) -> None:
+    def __init__(self, channel: Channel429, longest_ns: int) -> None:
         self.channel = channel
+        self._longest_ns = longest_ns
         self.end_ns = 0  # of the last word that waits
         self._times_ns: list[Numbers] = []
         self._offsets_ns: list[Numbers] = []
@@ -48,7 +50,7 @@ class WaitingWords:
     @property
     def until_ns(self) -> int | None:
         """Device time from which on no packet can join, or None while nothing waits."""
-        return int(self._times_ns[0][0]) + LONGEST_WAIT_NS if self._times_ns else None
+        return int(self._times_ns[0][0]) + self._longest_ns if self._times_ns else None
 
     def put(self, times_ns: Numbers, sizes: Numbers, bodies: bytes, offsets_ns: Numbers, end_ns: int) -> None:
         """Let packets wait, their bodies one behind the other; offsets lead from device times to the common ones."""

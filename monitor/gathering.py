@@ -112,14 +112,12 @@ def own_words(  # type: ignore[no-untyped-def] # typed by Aircraft
     which of them have a label of `in_order`, the source (SDI) in use, when it was last heard, and a bit for each of
     the others that were.
     """
-    heard, others, count, ordered = False, 0, 0, np.empty(words.size, np.int64)
+    others, count, ordered = 0, 0, np.empty(words.size, np.int64)
     for i in range(words.size):
         named = has_sdi[label[i]] and status[i] != BAD_PARITY
         sdi = int(words[i]) >> 8 & 3 if named else 0
-        if sdi and not heard:
-            heard = True
-            if not source or time_ns[i] - last_ns > SILENT_NS:
-                source = sdi
+        if sdi and (not source or (sdi != source and time_ns[i] - last_ns > SILENT_NS)):
+            source = sdi
         own[i] = sdi in (0, source)
         if sdi and own[i]:
             last_ns = time_ns[i]

@@ -6,7 +6,7 @@ is the true one. In the north and east both rules give the same and nothing can 
 """
 
 from collections import deque
-from statistics import fmean
+from itertools import pairwise
 
 from decoders.arinc429 import JOIN_RULES, TOWARD_ZERO, JoinRule
 from decoders.kernels429 import join_position
@@ -46,4 +46,5 @@ class JoinCheck:
 
 def _roughness_deg(joined: list[float]) -> float:
     """The mean of the second differences, whatever their signs."""
-    return fmean(abs(a - 2 * b + c) for a, b, c in zip(joined, joined[1:], joined[2:], strict=False))
+    steps = [b - a for a, b in pairwise(joined)]
+    return sum(abs(b - a) for a, b in pairwise(steps)) / (len(steps) - 1)

@@ -1,5 +1,6 @@
 """Which label of which equipment gives which quantity of the aircraft."""
 
+from functools import cache
 from typing import Final, NamedTuple
 
 from monitor.geodesy import FT_M, KT_M_S, NM_M
@@ -114,3 +115,10 @@ SOURCES_OF: Final = {
 AXIS_OF: Final = {(equipment, label): axis for axis in AXES for equipment in axis.equipment for label in axis[1:3]}
 QUANTITIES = tuple({row.quantity.name: row.quantity for row in (*SOURCES, *AXES)}.values())
 ROW_OF: Final = {quantity.name: row for row, quantity in enumerate(QUANTITIES)}  # of their samples
+
+
+@cache
+def are_distinct(equipment: tuple[int, ...]) -> bool:
+    """Whether no quantity is given by two of these boxes."""
+    given = [row.quantity.name for box in equipment for row in (*SOURCES, *AXES) if box in row.equipment]
+    return len(set(given)) == len(given)
