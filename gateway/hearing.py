@@ -40,6 +40,12 @@ class Hearing:
         """How long a source has not been heard; 0 for one that is not expected."""
         return now_ns - self._heard_ns.get(source, now_ns)
 
+    def may_fall_silent(self, now_ns: int) -> bool:
+        """Whether `fell_silent` would give any source if none spoke until then."""
+        return any(
+            now_ns - heard_ns > QUIET_NS for source, heard_ns in self._heard_ns.items() if source not in self._quiet
+        )
+
     def fell_silent(self, now_ns: int) -> Iterator[tuple[str, str]]:
         """The sources that have become quiet, and what to say of each."""
         for source in self._heard_ns:

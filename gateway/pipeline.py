@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import replace
 from operator import itemgetter
-from typing import cast
 
 import numpy as np
 
@@ -97,13 +96,22 @@ class Pipeline:
         batch = self.listener.framed([record for record in records if isinstance(record, Raw)])
         begin = chunks = 0
         for end in (*(k for k, record in enumerate(records) if not isinstance(record, Raw)), len(records)):
-            if end > begin:
-                some = cast(Sequence[Raw], records[begin:end])
+            others = records[end : end + 1]
+            if any(self._is_idle(record) for record in others):
+                continue
+            if some := [record for record in records[begin:end] if isinstance(record, Raw)]:
                 self.listener.take_all(some, batch.of_records(chunks, chunks + len(some)))
                 chunks += len(some)
-            for record in records[end : end + 1]:
+            for record in others:
                 self._take(record)
             begin = end + 1
+
+    def _is_idle(self, record: Record) -> bool:
+        """Whether a tick will find nothing to say, whatever comes before it."""
+        if not (isinstance(record, Tick) and self.listener.patient):
+            return False
+        now_ns, hearing = record.stamp.monotonic_ns, self.listener.hearing
+        return hearing.silent_ns(RADAR, now_ns) <= SILENCE_NS and not hearing.may_fall_silent(now_ns)
 
     def _take(self, record: Record) -> None:
         self._telling.begin(record)

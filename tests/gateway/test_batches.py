@@ -53,11 +53,16 @@ def cut_body(random: np.random.Generator, packet: Packet) -> list[Packet]:
     ]
 
 
+def falls_silent(_: np.random.Generator, packet: Packet) -> list[Packet]:
+    silent = packet.channel != RADAR and SECOND_NS < packet.time_ns < 7.5 * SECOND_NS
+    return [] if silent else [packet]
+
+
 def as_it_is(_: np.random.Generator, packet: Packet) -> list[Packet]:
     return [packet]
 
 
-CHANGES: list[Change] = [as_it_is, lost, doubled, flagged, clock_jumps, cut_body]
+CHANGES: list[Change] = [as_it_is, lost, doubled, flagged, clock_jumps, cut_body, falls_silent]
 
 
 @cache
@@ -100,15 +105,15 @@ def in_datagrams(arrival_ns: int, datagrams: list[bytes]) -> bytes:
     return b"".join(struct.pack(f.DATAGRAM_RECORD, arrival_ns, len(data)) + data for data in datagrams if data)
 
 
-def pipeline() -> Pipeline:
+def pipeline(tells_state: bool) -> Pipeline:
     adapters = [{"name": "line", "source": "serial:x"}, {"name": "net", "source": "udp:127.0.0.1:1"}]
     config = check_config({"adapters": adapters, "terrain": [BUILT_IN_TERRAIN["white_mountains"]]}, "test")
-    return Pipeline(config, build_monitor(config))
+    return Pipeline(config, build_monitor(config), tells_state=tells_state)
 
 
-def given(records: list[Record], sizes: list[int]) -> list[str]:
+def given(records: list[Record], sizes: list[int], tells_state: bool = True) -> list[str]:
     """The events of records that are fed so many at a time, in turn; 1 is one by one."""
-    made, lines, at = pipeline(), list[str](), 0
+    made, lines, at = pipeline(tells_state), list[str](), 0
     for size in cycle(sizes):
         if at >= len(records):
             break
@@ -126,6 +131,17 @@ def test_many_records_at_once_say_what_they_say_one_by_one(change: Change, noise
     assert sum('"type":"integrity"' in line for line in expected) >= 2
     for sizes in ([len(records)], [100], [3, 50, 1, 400]):
         assert given(records, sizes) == expected
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize("change", CHANGES)
+def test_where_nobody_asks_for_the_state_the_verdicts_and_counters_are_the_same(change: Change, noise: float) -> None:
+    records = flown(change, noise)
+    judged = '"type":"scan"', '"type":"integrity"', '"type":"summary"'
+    expected = [line for line in given(records, [1]) if any(kind in line for kind in judged)]
+    for sizes in ([1], [len(records)], [100]):
+        lines = given(records, sizes, tells_state=False)
+        assert [line for line in lines if any(kind in line for kind in judged)] == expected
 
 
 def test_most_packets_of_a_flight_are_taken_many_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
