@@ -4,6 +4,7 @@ A file appears only when it is whole. The row of a recording carries the digest 
 it is known what is there already.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -36,13 +37,13 @@ class DataSet:
     def __init__(self, directory: Path) -> None:
         self._directory = directory
 
-    def has(self, name: str, key: str) -> bool:
-        """Whether the result of a recording is there and still holds."""
+    def has(self, name: str, key: Callable[[], str]) -> bool:
+        """Whether the result of a recording is there and still holds, which only then its key is asked for."""
         path = self._path("recordings", name)
         if not path.exists() or not self._path("verdicts", name).exists():
             return False
         found: list[str] = pq.read_table(path, columns=["key"])["key"].to_pylist()
-        return found == [key]
+        return found == [key()]
 
     def put(self, name: str, outcome: Outcome) -> None:
         """Keep a result, instead of an older one. Raises GatewayError if the disk does not take it."""
