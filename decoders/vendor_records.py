@@ -14,12 +14,16 @@ import numpy.typing as npt
 from decoders import formats as f
 from decoders import vendors as v
 from decoders.framing import Packet, PacketFramer
+from decoders.profiles import load_profile
 from decoders.racklink_can import Block
 
 ENTRY: Final = struct.Struct("<II")  # of an ARINC 429 packet: ns after the packet's time, word
 HEAD: Final = struct.Struct("<HH")  # of a SEQRECORD: type, count
 TICKS: Final = struct.Struct("<I")  # its time: the low half behind the head, the high half at the end
 LATEST_NS: Final = (1 << 63) - 1  # later times, which no clock has, become this one, and the pipeline refuses it
+RADAR_LABELS: Final = frozenset(
+    int(f"{label:08b}"[::-1], 2) for label in load_profile("arinc708").labels
+)  # on the wire
 Records = npt.NDArray[Any]  # structured, one of the layouts of `decoders.vendors`
 
 
@@ -273,20 +277,24 @@ class Mxf708Framer(FixedFramer):
 
 
 class Rdr4bFramer(FixedFramer):
-    """The file of an RDR-4B: radar words without a time, so they are counted, and their rate is taken as constant."""
+    """The file of an RDR-4B: radar words without a time, so they are counted, and their rate is taken as constant.
 
-    NAMES: ClassVar = (*RecordFramer.NAMES, "timed_by_count")
+    Nor has it a mark of where a record begins: behind a byte that is missing, words have labels that no radar sends.
+    """
+
+    NAMES: ClassVar = (*RecordFramer.NAMES, "timed_by_count", "words_of_unknown_label")
     LAYOUT: ClassVar = v.RDR4B
 
     def __init__(self, reading: v.Reading, channel: int = 0) -> None:
         super().__init__(reading, channel)
-        self.timed_by_count = 0
+        self.timed_by_count = self.words_of_unknown_label = 0
 
     def _take_records(self, records: Records) -> None:
         times_ns = self._record_times_ns(records, self.timed_by_count)
         self.timed_by_count += len(records)
-        for time_ns, data in zip(times_ns, records["data"], strict=True):
-            self._radar(self._channel, 0, time_ns, f.WORD_708_BITS, data.tobytes())
+        for time_ns, data in zip(times_ns, map(np.void.tobytes, records["data"]), strict=True):
+            self.words_of_unknown_label += data[0] not in RADAR_LABELS
+            self._radar(self._channel, 0, time_ns, f.WORD_708_BITS, data)
 
     def _record_times_ns(self, records: Records, number: int) -> list[int]:
         rate = self.reading.words_per_s

@@ -63,6 +63,6 @@ def replay(
     if source.torn:
         print(f"shadebus: {recording}: {source.torn}; every whole record was replayed", file=sys.stderr)
     if source.damaged:
-        failures.append(f"{source.damaged} damaged records were skipped")
+        failures.append(f"{source.damaged} damaged record{'s' * (source.damaged > 1)} skipped")
     if failures:
         raise GatewayError(f"{recording}: " + "; ".join(failures))

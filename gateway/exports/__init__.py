@@ -67,7 +67,7 @@ def export(
         said = [f"{path}: {write(job, place)}"]
     said += [f"left out: {count} {what}" for what, count in job.left_out.items() if count]
     if source.damaged:
-        said.append(f"left out: {source.damaged} damaged records")
+        said.append(f"left out: {source.damaged} damaged record{'s' * (source.damaged > 1)}")
     if source.torn:
         said.append(f"{source.torn}; every whole record is in")
     return said + [f"a defect cost part of a scan: {failure}" for failure in job.failures]

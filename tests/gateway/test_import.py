@@ -146,6 +146,18 @@ def test_an_rdr_4b_s_words_are_said_to_be_timed_by_their_number(words: list[Word
     assert recorded_bytes(out, "rdr4b") == radar + b"torn" + radar
 
 
+def test_a_byte_that_an_rdr_4b_s_file_lacks_shows_in_labels_that_no_radar_sends(
+    words: list[Word], tmp_path: Path
+) -> None:
+    whole = [rdr4b(word) for word in words if len(word[2]) == 200]
+    assert all(record[18] == 0b10110100 for record in whole), "octal 055, its most significant bit first on the wire"
+    assert summary(imported(tmp_path, "rdr4b", b"".join(whole)))["rdr4b.words_of_unknown_label"] == 0
+    missing = b"".join(whole[:5]) + b"".join(whole[5:])[1:]
+    (tmp_path / "cut").mkdir()
+    found = summary(imported(tmp_path / "cut", "rdr4b", missing))
+    assert found["rdr4b.words_of_unknown_label"] > (len(whole) - 6) * 0.9
+
+
 def test_another_rate_is_taken_and_said(tmp_path: Path) -> None:
     out = imported(tmp_path, "rdr4b", rdr4b((0, 0, bytes(200))) * 3, vendor={"words_per_s": 80.0})
     assert "80 words a second" in notes(out)[0]

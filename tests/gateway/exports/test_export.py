@@ -66,7 +66,7 @@ def test_a_damaged_record_is_left_out_and_counted(form: str, tmp_path: Path, to:
     data = path.read_bytes()
     path.write_bytes(data.replace(struct.pack("<I", 0xE00190A1), struct.pack("<I", 0xE00190A0)))
     assert path.read_bytes() != data
-    assert "left out: 1 damaged records" in to(path, form)[1]
+    assert "left out: 1 damaged record" in to(path, form)[1]
 
 
 @pytest.mark.parametrize("form", FORMATS)
