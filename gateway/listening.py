@@ -261,6 +261,7 @@ class Listener:
         here, now_ns = (record.adapter, packet.channel), record.stamp.monotonic_ns
         channel = link.channels.get(packet.channel)
         if name := link.identify(packet):
+            self._read()  # what waits came before this channel could take anything over
             reason = f"label 377 says what channel {packet.channel} is: read as {name} from now on"
             self._telling.tell(record.adapter, "IDENTIFIED", reason)
             return False

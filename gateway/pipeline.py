@@ -79,12 +79,8 @@ class Pipeline:
     def feed_all(self, records: Sequence[Record]) -> list[Event]:
         """The events that many records cause: the same as one by one, and sooner."""
         # What was dropped before a chunk is owned up to by the next verdict and not by one before.
-        links = self.listener.links
-        alone = [
-            k for k, r in enumerate(records) if isinstance(r, Raw) and (r.dropped_before or r.adapter not in links)
-        ]
-        begin = 0
-        for end in (*alone, len(records)):
+        begin, links = 0, self.listener.links
+        for end in (*(k for k, record in enumerate(records) if _stands_alone(record, links)), len(records)):
             self._take_all(records[begin:end])
             for record in records[end : end + 1]:
                 self._take(record)
@@ -97,7 +93,7 @@ class Pipeline:
         begin = chunks = 0
         for end in (*(k for k, record in enumerate(records) if not isinstance(record, Raw)), len(records)):
             others = records[end : end + 1]
-            if any(self._is_idle(record) for record in others):
+            if any(self._is_idle(record, records[begin].stamp.monotonic_ns) for record in others):
                 continue
             if some := [record for record in records[begin:end] if isinstance(record, Raw)]:
                 self.listener.take_all(some, batch.of_records(chunks, chunks + len(some)))
@@ -105,13 +101,16 @@ class Pipeline:
             for record in others:
                 self._take(record)
             begin = end + 1
+        if records:
+            self._telling.begin(records[-1])
 
-    def _is_idle(self, record: Record) -> bool:
-        """Whether a tick will find nothing to say, whatever comes before it."""
+    def _is_idle(self, record: Record, since_ns: int) -> bool:
+        """Whether a tick will find nothing to say, whatever comes before it from `since_ns` on."""
         if not (isinstance(record, Tick) and self.listener.patient):
             return False
         now_ns, hearing = record.stamp.monotonic_ns, self.listener.hearing
-        return hearing.silent_ns(RADAR, now_ns) <= SILENCE_NS and not hearing.may_fall_silent(now_ns)
+        soon = now_ns - since_ns <= SILENCE_NS  # for a source that is heard for the first time
+        return soon and hearing.silent_ns(RADAR, now_ns) <= SILENCE_NS and not hearing.may_fall_silent(now_ns)
 
     def _take(self, record: Record) -> None:
         self._telling.begin(record)

@@ -76,6 +76,7 @@ class Aircraft:
         self.tracks = {q.name: Track(q, self._samples, row) for row, q in enumerate(QUANTITIES)}
         self._owners = nobody()  # by quantity, the equipment that gives it
         self._sources: dict[int, tuple[int, int]] = {}  # equipment -> SDI in use, when last heard
+        self._left_out: dict[int, int] = {}  # equipment -> which SDIs, as `own_words` gives them
         self._strange: dict[str, str] = {}
         self._halves: dict[str, _Half] = {}
         self._joins = {axis.quantity.name: JoinCheck() for axis in AXES}
@@ -129,11 +130,8 @@ class Aircraft:
         in_order, source, last_ns, others = own_words(time_ns, words, values.label, values.status, *kinds, *before, own)
         self._sources[equipment] = source, last_ns
         if others:
-            left_out = ", ".join(str(sdi) for sdi in range(4) if others >> sdi & 1)
-            self._strange[f"SDI {source} of equipment {equipment:02X}"] = (
-                f"words of SDI {left_out} are left out, as this one was heard first: "
-                "say with sdi which one the channel is to use, or with definitions that bits 9 and 10 are data"
-            )
+            self._left_out[equipment] = self._left_out.get(equipment, 0) | others
+            self._strange |= _left_out(equipment, self._left_out[equipment])
         found: list[int] = in_order.tolist()
         return found
 
@@ -168,3 +166,15 @@ class Aircraft:
         impossible = axis.quantity.name.endswith("latitude_deg") and abs(degrees) > 90
         status = int(Status.INVALID_DATA) if impossible else NORMAL
         self._append(axis.quantity, equipment, coarse.time_ns, degrees, status)
+
+
+def _left_out(equipment: int, others: int) -> dict[str, str]:
+    """By source, why its words are used and not those of others, which `own_words` left out."""
+    found = {}
+    for source in range(1, 4):
+        if left_out := ", ".join(str(sdi) for sdi in range(1, 4) if others >> 4 * source + sdi & 1):
+            found[f"SDI {source} of equipment {equipment:02X}"] = (
+                f"words of SDI {left_out} are left out, as this one was heard first: "
+                "say with sdi which one the channel is to use, or with definitions that bits 9 and 10 are data"
+            )
+    return found

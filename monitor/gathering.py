@@ -109,8 +109,8 @@ def own_words(  # type: ignore[no-untyped-def] # typed by Aircraft
     """Mark in `own` (n,) the words that are not of another source than the one in use, 0 if none was heard yet.
 
     Words to all (SDI 0), words without an SDI and damaged ones, whose SDI says nothing, are of every source. Gives
-    which of them have a label of `in_order`, the source (SDI) in use, when it was last heard, and a bit for each of
-    the others that were.
+    which of them have a label of `in_order`, the source (SDI) in use, when it was last heard, and which others were
+    left out: bit 4 n + m for words of m while n was in use.
     """
     others, count, ordered = 0, 0, np.empty(words.size, np.int64)
     for i in range(words.size):
@@ -122,7 +122,7 @@ def own_words(  # type: ignore[no-untyped-def] # typed by Aircraft
         if sdi and own[i]:
             last_ns = time_ns[i]
         elif sdi:
-            others |= 1 << sdi
+            others |= 1 << 4 * source + sdi
         if own[i] and in_order[label[i]]:
             ordered[count] = i
             count += 1

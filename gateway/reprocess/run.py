@@ -11,7 +11,7 @@ from distributed import Client, LocalCluster, as_completed
 
 from gateway.errors import GatewayError
 from gateway.reprocess.dataset import DataSet
-from gateway.reprocess.job import Job, key, work
+from gateway.reprocess.job import Job, Outcome, key, work
 
 LOCAL: Final = {
     "processes": True,
@@ -48,19 +48,31 @@ def reprocess(jobs: Sequence[Job], data: DataSet, scheduler: str | None, progres
     if not due:
         return Done(kept, made, failed)
     with _client(scheduler, len(due)) as client:
-        of = {client.submit(work, job, pure=False): job for job in due}
+        of = {client.submit(attempt, job, pure=False): job for job in due}
         for future in as_completed(of):
             job = of[future]
             try:
                 outcome = future.result()
-            except Exception as error:  # noqa: BLE001 # whatever one recording brings up must not cost the others
-                failed[job.name] = str(error) if isinstance(error, GatewayError) else f"{type(error).__name__}: {error}"
+            except Exception as error:  # noqa: BLE001 # such as a recording that ends every worker
+                outcome = f"{type(error).__name__}: {error}"
+            if isinstance(outcome, str):
+                failed[job.name] = outcome
             else:
                 data.put(job.name, outcome)
                 made.append(job.name)
             future.release()
             progress(len(jobs) - len(due) + len(made) + len(failed), len(jobs))
     return Done(kept, sorted(made), failed)
+
+
+def attempt(job: Job) -> Outcome | str:
+    """The outcome of a job, or why there is none: whatever one recording brings up must not cost the others."""
+    try:
+        return work(job)
+    except GatewayError as error:
+        return str(error)
+    except Exception as error:  # noqa: BLE001
+        return f"{type(error).__name__}: {error}"
 
 
 def _holds(job: Job, data: DataSet, failed: dict[str, str]) -> bool:
