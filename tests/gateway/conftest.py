@@ -7,6 +7,7 @@ import pytest
 from hypothesis import settings
 
 from gateway.config import RackConfig, check_config
+from gateway.warmup import warm_up_words
 from simulators.carriers import stream as stream_carrier
 from simulators.link import units
 from simulators.scenario import BUILT_IN_TERRAIN, Scenario, white_mountains
@@ -17,6 +18,12 @@ settings.load_profile("compiled")
 
 TERRAIN = BUILT_IN_TERRAIN["white_mountains"]
 MakeRack = Callable[..., RackConfig]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _compiled() -> None:
+    """What a live gateway compiles at its first start ever, it must not compile while a test waits for words."""
+    warm_up_words()
 
 
 @pytest.fixture(scope="session")
