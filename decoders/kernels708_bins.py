@@ -57,10 +57,7 @@ def _spread_word(_context: Any, width: Any, _length: Any, word: Any, bins: Any, 
     """
     bits = width.literal_value
     at_once = BYTES_AT_ONCE * 8 // bits
-    first_bit = [2 * bits * pair for pair in range(at_once // 2)]
-    last_byte = [(bit + 2 * bits - 1) // 8 for bit in first_bit]
-    shift = [bit - 8 * (byte - 1) for bit, byte in zip(first_bit, last_byte, strict=True)]
-    lane_bytes = [byte for bit, last in zip(first_bit, last_byte, strict=True) for byte in (bit // 8, last)]
+    shift, lane_bytes = _lanes(bits, at_once)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         source, target = (context.make_array(signature.args[k])(context, builder, arguments[k]) for k in (2, 3))
@@ -112,6 +109,14 @@ def _spread_word(_context: Any, width: Any, _length: Any, word: Any, bins: Any, 
         return builder.zext(builder.icmp_unsigned("!=", any_found, any_found.type(0)), i8)
 
     return types.uint8(width, types.int64, word, bins, level), generate
+
+
+def _lanes(bits: int, at_once: int) -> tuple[list[int], list[int]]:
+    """Of each lane, how far its pair of bins is from its foot; of each two, the bytes of a step that they come from."""
+    first_bit = [2 * bits * pair for pair in range(at_once // 2)]
+    last_byte = [(bit + 2 * bits - 1) // 8 for bit in first_bit]
+    shift = [bit - 8 * (byte - 1) for bit, byte in zip(first_bit, last_byte, strict=True)]
+    return shift, [byte for bit, last in zip(first_bit, last_byte, strict=True) for byte in (bit // 8, last)]
 
 
 def _shuffled(builder: Any, one: Any, other: Any, pick: list[int]) -> Any:

@@ -78,7 +78,6 @@ class Pipeline:
 
     def feed_all(self, records: Sequence[Record]) -> list[Event]:
         """The events that many records cause: the same as one by one, and sooner."""
-        # What was dropped before a chunk is owned up to by the next verdict and not by one before.
         begin, links = 0, self.listener.links
         for end in (*(k for k, record in enumerate(records) if _stands_alone(record, links)), len(records)):
             self._take_all(records[begin:end])

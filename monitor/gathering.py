@@ -16,6 +16,7 @@ from monitor.track import NORMAL, STALE, put
 BAD_PARITY: Final = int(Status.BAD_PARITY)
 SILENT_NS: Final = 2_500_000_000  # of a source; nothing is interpolated over so long a gap, so another can follow it
 NOBODY: Final = -1  # owns a quantity
+LONGEST_NS: Final = np.array([round(2e9 * q.longest_gap_s) for q in QUANTITIES])  # silence of a quantity's owner
 GIVES: Final = np.dtype(
     [("row", "i8"), ("scale", "f8"), ("shift", "i8"), ("mask", "i8"), ("from_ellipsoid", "?")]
 )  # of the quantity; SI units, or the bits of the word that say it (mask 0: none); whether the geoid is to be taken off
@@ -63,9 +64,6 @@ def given(definitions: Definitions, height_source: HeightSource) -> Given:
 def nobody() -> NDArray[np.int64]:
     """By quantity, which equipment gives it: none yet."""
     return np.full(len(QUANTITIES), NOBODY)
-
-
-LONGEST_NS: Final = np.array([round(2e9 * quantity.longest_gap_s) for quantity in QUANTITIES])
 
 
 @njit(cache=True)

@@ -133,6 +133,21 @@ def test_of_two_sources_on_one_bus_the_first_is_used_until_it_falls_silent() -> 
     assert [*aircraft.doubts()] == ["SDI 1 of equipment 04", "SDI 2 of equipment 04"]
 
 
+def test_which_source_is_left_out_for_which_does_not_depend_on_the_blocks() -> None:
+    sent = [(time, pitch(1, 182)) for time in range(0, 400, 20)] + [
+        (time, pitch(2, 191)) for time in range(1, 4000, 20)
+    ]
+    sent.sort()
+    whole, cut = Aircraft(), Aircraft()
+    feed(whole, IRU, sent)
+    for word in sent:
+        feed(cut, IRU, [word])
+    ((about, doubt),) = whole.doubts().items()
+    assert (about, doubt.partition(",")[0]) == ("SDI 1 of equipment 04", "words of SDI 2 are left out")
+    assert cut.doubts() == whole.doubts()
+    assert cut.tracks["pitch_deg"].newest == whole.tracks["pitch_deg"].newest == (3981 * MS, 191 * 180 / 2**14, 0)
+
+
 def test_a_damaged_word_chooses_no_source_and_is_a_hole() -> None:
     aircraft = Aircraft()
     feed(aircraft, IRU, [(0, pitch(2, 191, odd=False)), (20, pitch(1, 182)), (40, pitch(3, 182, odd=False))])
