@@ -41,6 +41,7 @@ from gateway.report import Flown, Picture, write_report
 from gateway.stopping import Stop
 from gateway.tables import plain_console
 from gateway.threads import GuardedThread
+from gateway.warmup import warm_up_words
 from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Monitor, Verdict
 from monitor.scans import Scan
 from monitor.terrain import open_terrain
@@ -119,6 +120,7 @@ def fly(out: Path, seed: int, speed: float, stop: Stop) -> None:
     console.print(
         f"Three legs of {LEG_S:.0f} s over the White Mountains at {speed:g} times real bus rates, P_FA {P_FA:g}"
     )
+    warm_up_words()
     warm_up(Monitor(open_terrain(true_terrain)))  # or the first gateway compiles before it hears anything
     flown = []
     for leg in legs:
