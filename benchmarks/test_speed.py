@@ -24,6 +24,7 @@ from simulators.scenario import BUILT_IN_TERRAIN
 RADIALS, BINS, RANGE_NM = 361, 512, 10.0
 RNG = np.random.default_rng(1)
 PACKETS = 2000
+LONG_ENOUGH_S = 5.0  # that some rounds of work that fills a core fall into moments when nobody else shares it
 
 
 @pytest.fixture(scope="module")
@@ -71,26 +72,26 @@ def radar_words(count: int) -> NDArray[np.uint8]:
     return RNG.integers(0, 256, (count, 200), np.uint8)
 
 
-@pytest.mark.benchmark(group="708 words to radials, 10000 words")
+@pytest.mark.benchmark(group="708 words to radials, 10000 words", max_time=LONG_ENOUGH_S)
 def test_708_unpack(benchmark: BenchmarkFixture) -> None:
     words = radar_words(10_000)
     assert len(arinc708.unpack(words).bins) == len(words)
     assert benchmark(lambda: arinc708.unpack(words)).bins.shape == (10_000, BINS)
 
 
-@pytest.mark.benchmark(group="708 words to radials, 10000 words")
+@pytest.mark.benchmark(group="708 words to radials, 10000 words", max_time=LONG_ENOUGH_S)
 def test_copy_of_the_708_output(benchmark: BenchmarkFixture) -> None:
     radials = arinc708.unpack(radar_words(10_000))
     assert len(benchmark(lambda: [part.copy() for part in radials])) == len(radials)
 
 
-@pytest.mark.benchmark(group="708 words to radials, 100000 words")
+@pytest.mark.benchmark(group="708 words to radials, 100000 words", max_time=LONG_ENOUGH_S)
 def test_708_unpack_beyond_the_caches(benchmark: BenchmarkFixture) -> None:
     words = radar_words(100_000)
     assert benchmark(lambda: arinc708.unpack(words)).bins.shape == (100_000, BINS)
 
 
-@pytest.mark.benchmark(group="708 words to radials, 100000 words")
+@pytest.mark.benchmark(group="708 words to radials, 100000 words", max_time=LONG_ENOUGH_S)
 def test_copy_of_the_708_output_beyond_the_caches(benchmark: BenchmarkFixture) -> None:
     radials = arinc708.unpack(radar_words(100_000))
     assert len(benchmark(lambda: [part.copy() for part in radials])) == len(radials)

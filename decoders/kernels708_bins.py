@@ -23,10 +23,14 @@ LOADED: Final = 16  # bytes for one half, with some before
 
 @njit(cache=True)
 def unpack_bins(words: Bytes, bits_per_bin: int, reserved_level: int, bins: Bytes, unusual: Bytes) -> None:
-    """Fill the bins of each word, 32 or more of 3 or 6 bits, and flag the words that hold a reserved level."""
+    """Fill the bins of each word, 32 or more of 3 or 6 bits, and flag the words that hold a reserved level.
+
+    From the last bin to the first: the system clears a large piece of fresh memory from its beginning, so its end is
+    still in the caches, and beyond them this takes two thirds of the time.
+    """
     level = np.uint8(reserved_level)
     count = bins.shape[1]
-    for i in range(words.shape[0]):
+    for i in range(words.shape[0] - 1, -1, -1):
         word, row = words[i], bins[i]
         if bits_per_bin == 3 and count == BINS:  # the standard's own: a count known when compiled is faster
             found = _spread(3, BINS, word, row, level)
@@ -98,13 +102,14 @@ def _spread_word(_context: Any, width: Any, _length: Any, word: Any, bins: Any, 
 
         length, steps = arguments[1], builder.udiv(arguments[1], count(at_once))
         last = builder.sub(steps, count(1))
-        spread_out(halves(count(0)), count(0))
-        with cgutils.for_range(builder, last, start=count(1)) as loop:
-            spread_out(whole(loop.index), builder.mul(loop.index, count(at_once)))
-        spread_out(halves(builder.mul(last, count(BYTES_AT_ONCE))), builder.mul(last, count(at_once)))
         with builder.if_then(builder.icmp_unsigned("!=", builder.mul(steps, count(at_once)), length)):
-            back = builder.sub(length, count(at_once))  # what is left, with some done before
-            spread_out(halves(builder.udiv(builder.mul(back, count(bits)), count(8))), back)
+            rest = builder.sub(length, count(at_once))  # more than what no whole step takes
+            spread_out(halves(builder.udiv(builder.mul(rest, count(bits)), count(8))), rest)
+        spread_out(halves(builder.mul(last, count(BYTES_AT_ONCE))), builder.mul(last, count(at_once)))
+        with cgutils.for_range(builder, last, start=count(1)) as loop:
+            step = builder.sub(last, loop.index)
+            spread_out(whole(step), builder.mul(step, count(at_once)))
+        spread_out(halves(count(0)), count(0))
         any_found = builder.bitcast(builder.load(found), ir.IntType(8 * at_once))
         return builder.zext(builder.icmp_unsigned("!=", any_found, any_found.type(0)), i8)
 
