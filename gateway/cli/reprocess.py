@@ -18,6 +18,11 @@ def reprocess(
     The verdicts land in a Parquet data set. A second run does only what is new or has changed: the recording, the
     configuration, the terrain, or this program.
     """
+    from gateway.reprocess.workers import get_ready
+
+    if not scheduler:
+        get_ready()  # before all the rest is imported, which takes as long
+
     from rich.progress import Progress
 
     from gateway.config import load_config

@@ -12,6 +12,7 @@ from distributed import Client, LocalCluster, as_completed
 from gateway.errors import GatewayError
 from gateway.reprocess.dataset import DataSet
 from gateway.reprocess.job import Job, Outcome, key, work
+from gateway.reprocess.workers import get_ready
 
 LOCAL: Final = {
     "processes": True,
@@ -20,11 +21,9 @@ LOCAL: Final = {
     "host": "127.0.0.1",
     "silence_logs": logging.ERROR,  # that a worker took its time to end is nobody's concern
 }
-KEPT_BYTES: Final = 1 << 28  # of freed memory; to give it back and ask for it again takes a tenth of the time
 SETTINGS: Final = {
+    "distributed.worker.multiprocessing-method": "forkserver",
     "distributed.worker.profile.enabled": False,  # it looks at the stacks a hundred times a second
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": KEPT_BYTES,
-    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": KEPT_BYTES,
 }
 
 
@@ -95,6 +94,7 @@ def _client(scheduler: str | None, most: int) -> Iterator[Client]:
         with client:
             yield client
     else:
+        get_ready()
         with dask.config.set(SETTINGS), LocalCluster(**LOCAL) as cluster:
             cluster.scale(min(most, len(cluster.workers)))
             with Client(cluster) as client:
