@@ -14,8 +14,9 @@ from gateway.metadata import build_monitor
 from gateway.pipeline import Pipeline
 from gateway.records import Raw, Stamp
 from monitor.calibration import Calibration
-from monitor.integrity import ALERT, Comparison, Verdict
+from monitor.comparison import Comparison
 from monitor.scans import Scan
+from monitor.verdict import ALERT, Verdict
 from simulators.carriers import stream
 from simulators.link import units
 from simulators.scenario import Scenario

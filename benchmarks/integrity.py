@@ -16,7 +16,7 @@ from benchmarks.flights import ENOUGH_PAIRS, Flight, detections, fly_all
 from gateway.demo import CALIBRATION, SHIFT_EAST_M, shift_terrain
 from monitor.calibration import load_calibration
 from monitor.disparity import robust_threshold
-from monitor.integrity import UNAVAILABLE, Verdict
+from monitor.verdict import UNAVAILABLE, Verdict
 from simulators.campaign import draw_legs
 from simulators.scenario import Scenario, white_mountains
 

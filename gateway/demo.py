@@ -42,9 +42,11 @@ from gateway.stopping import Stop
 from gateway.tables import plain_console
 from gateway.threads import GuardedThread
 from gateway.warmup import warm_up_words
-from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Monitor, Verdict
+from monitor.comparison import Comparison
+from monitor.integrity import Monitor
 from monitor.scans import Scan
 from monitor.terrain import open_terrain
+from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
 from monitor.warmup import warm_up
 
 SHIFT_EAST_M = 500.0

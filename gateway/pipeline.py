@@ -24,9 +24,11 @@ from gateway.listening import Listener
 from gateway.records import Raw, Record, Status, Tick
 from gateway.telling import Telling
 from monitor.aircraft import Aircraft, status_name
+from monitor.comparison import Comparison
 from monitor.control_echo import ControlEcho
-from monitor.integrity import Comparison, Monitor, Verdict
+from monitor.integrity import Monitor
 from monitor.scans import SILENCE_NS, Scan, ScanBuilder
+from monitor.verdict import Verdict
 
 Watcher = Callable[[Scan, Verdict, Comparison | None], None]
 

@@ -21,10 +21,12 @@ from decoders.profiles import Profile
 from gateway.console import clock
 from gateway.recording import Recording
 from monitor.calibration import Calibration
+from monitor.comparison import Comparison
 from monitor.disparity import threshold
 from monitor.geodesy import NM_M
-from monitor.integrity import ALERT, OK, UNAVAILABLE, Comparison, Monitor, Verdict
+from monitor.integrity import Monitor
 from monitor.scans import Scan
+from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
 
 VERDICT_COLOURS = {OK: "#2f8f4e", ALERT: "#c62828", UNAVAILABLE: "#b38600"}
 LEGEND = [

@@ -5,7 +5,8 @@ import numpy as np
 from decoders.arinc708 import unpack
 from decoders.formats import MODES_708, WORD_708_BYTES
 from monitor.aircraft import Aircraft
-from monitor.integrity import NEEDED, Monitor
+from monitor.integrity import Monitor
+from monitor.pointing import NEEDED
 from monitor.scans import ScanBuilder
 
 SECOND_NS = 1_000_000_000

@@ -11,8 +11,8 @@ from benchmarks.flights import Flight, Judged, fly
 from benchmarks.sensitivity import ERRORS, SENSITIVITY
 from gateway.demo import CALIBRATION, SHIFT_EAST_M, shift_terrain
 from monitor.calibration import load_calibration
-from monitor.integrity import ALERT, OK, UNAVAILABLE
 from monitor.terrain import open_terrain
+from monitor.verdict import ALERT, OK, UNAVAILABLE
 from simulators.scenario import BUILT_IN_TERRAIN, Fault, Radar, Scenario, World, white_mountains
 from simulators.scenario import Flight as Plan
 

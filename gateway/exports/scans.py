@@ -15,9 +15,11 @@ from gateway.metadata import recorded_monitor
 from gateway.pipeline import Pipeline
 from gateway.words import UtcLayer
 from monitor.aircraft import Aircraft
-from monitor.integrity import Comparison, Monitor, Verdict
+from monitor.comparison import Comparison
+from monitor.integrity import Monitor
 from monitor.scans import Scan
 from monitor.settings import MonitorSettings
+from monitor.verdict import Verdict
 
 
 class Judged(NamedTuple):

@@ -22,8 +22,9 @@ from gateway.recording import Recorder, Recording, keeper
 from gateway.recording.verify import verify
 from gateway.records import Raw, Record, Status
 from gateway.service import Service
-from monitor.integrity import Comparison, Verdict
+from monitor.comparison import Comparison
 from monitor.scans import Scan
+from monitor.verdict import Verdict
 from simulators.outlets import PtyOutlet
 from tests.gateway.conftest import TERRAIN, MakeRack
 from tests.gateway.live import Live, recorded_bytes, records, wait_until

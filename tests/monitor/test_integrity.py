@@ -17,13 +17,16 @@ from scipy.stats import chi2, ncx2
 from decoders.formats import MODES_708
 from monitor.aircraft import Aircraft
 from monitor.calibration import NO_CALIBRATION, Calibration
-from monitor.integrity import NEEDED, Comparison, Monitor, Verdict, thin
+from monitor.comparison import Comparison, thin
+from monitor.integrity import Monitor
+from monitor.pointing import NEEDED
 from monitor.prediction import Beam, Pointing, predict
 from monitor.quantities import GNSS_MODE, INTEGRITY_LIMIT, SATELLITE_FAILURE
 from monitor.scans import Scan
 from monitor.settings import LeverArm, MonitorSettings
 from monitor.terrain import Terrain
 from monitor.track import Track
+from monitor.verdict import Verdict
 
 MS = 1_000_000
 ANGLES = np.arange(-90.0, 91.0, 3.0)

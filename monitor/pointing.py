@@ -1,0 +1,52 @@
+"""Where the radar antenna was and looked on the radials of a scan, and why that is not known for others."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from monitor import quantities as state
+from monitor.aircraft import Aircraft, status_name
+from monitor.gate import position_doubts
+from monitor.geodesy import HIGHEST_LATITUDE_DEG, body_to_enu, displace
+from monitor.prediction import Pointing
+from monitor.scans import Scan
+from monitor.settings import MonitorSettings
+
+NEEDED = (state.LATITUDE, state.LONGITUDE, state.HEIGHT, state.PITCH, state.ROLL, state.HEADING)
+
+
+def point(
+    scan: Scan, aircraft: Aircraft, chosen: NDArray[np.intp], settings: MonitorSettings
+) -> tuple[Pointing, NDArray[np.bool_], list[str]]:
+    """The pointing of those of the `chosen` radials (n,) whose state is known, which these are, and why not others."""
+    times = scan.time_ns[chosen]
+    found = [aircraft.tracks[quantity.name].at(times) for quantity in NEEDED]
+    status = np.array([values.status for values in found])
+    usable = (status == 0).all(axis=0)
+    reasons = [
+        f"{quantity.name}: {status_name(int(row[row > 0][0]))} on {np.count_nonzero(row)} of {len(times)} radials"
+        for quantity, row in zip(NEEDED, status, strict=True)
+        if row.any()
+    ]
+    if settings.position_gate:
+        doubtful, doubts = position_doubts(aircraft, times, settings.largest_integrity_limit_nm)
+        usable &= ~doubtful
+        reasons += doubts
+    polar = usable & (np.abs(found[0].value) > HIGHEST_LATITUDE_DEG)
+    if polar.any():
+        usable &= ~polar
+        reasons.append(f"{np.count_nonzero(polar)} radials start beyond {HIGHEST_LATITUDE_DEG:g} degrees of latitude")
+    lat, lon, height, pitch, roll, heading = (values.value[usable] for values in found)
+    arm = settings.lever_arm
+    ones = np.ones(len(lat))
+    east, north, up = body_to_enu(arm.forward_m * ones, arm.right_m * ones, arm.down_m * ones, roll, pitch, heading)
+    lat, lon, height = displace(lat, lon, height, east, north, up)
+    angle, tilt = np.radians(scan.scan_angle_deg[chosen][usable]), math.radians(scan.tilt_deg)
+    if scan.stabilised:
+        azimuth, elevation = np.radians(heading) + angle, np.full(len(lat), tilt)
+    else:
+        look = (math.cos(tilt) * np.cos(angle), math.cos(tilt) * np.sin(angle), -math.sin(tilt) * ones)
+        east, north, up = body_to_enu(*look, roll, pitch, heading)
+        azimuth, elevation = np.arctan2(east, north), np.arcsin(np.clip(up, -1, 1))
+    return Pointing(lat, lon, height, azimuth, elevation), usable, reasons
