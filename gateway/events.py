@@ -78,6 +78,9 @@ class IntegrityEvent(Event):
     level: float | None
     mdb_bins: float | None
     calibration: str
+    offset_north_m: float | None
+    offset_east_m: float | None
+    offset_confidence: float | None
     verdict: str
     reasons: tuple[str, ...]
 

@@ -1,6 +1,7 @@
 """One scan, the aircraft's state and the terrain to a verdict: does the stored terrain agree with the radar?"""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, Test, examine
 from monitor.disparity import statistic, threshold
 from monitor.geodesy import LONGEST_RANGE_NM
 from monitor.hysteresis import Hysteresis
+from monitor.offset import Search
 from monitor.pointing import point
 from monitor.prediction import Pointing
 from monitor.sample import NOTHING, ScanSample
@@ -51,7 +53,18 @@ class Monitor:
         comparison, lost = compare(scan, chosen[usable], pointing, self.terrain, self.settings)
         if lost:
             reasons.append(f"{lost} radials leave the terrain or cross voids")
-        return self._decide(scan, comparison, self._buried(pointing), reasons), comparison
+        verdict = self._decide(scan, comparison, self._buried(pointing), reasons)
+        if verdict.verdict == ALERT and self.settings.offset_search_m:
+            calibration = self.calibration or uncalibrated(scan.bins.shape[1])
+            search = Search(scan, chosen[usable], pointing, self.terrain, self.settings, calibration)
+            found = search.most_likely()
+            verdict = replace(
+                verdict,
+                offset_north_m=found.north_m,
+                offset_east_m=found.east_m,
+                offset_confidence=found.confidence,
+            )
+        return verdict, comparison
 
     def _refusal(self, scan: Scan) -> str | None:
         if scan.mode != MODES_708["map"]:

@@ -31,6 +31,12 @@ class MonitorSettings(BaseModel):
     )
     alert_scans: int = Field(1, ge=1, le=30, description="scans in a row beyond a threshold that make an alert")
     clear_scans: int = Field(1, ge=1, le=30, description="scans in a row within the thresholds that end an alert")
+    offset_search_m: float = Field(
+        1200.0,
+        ge=0,
+        le=5000,
+        description="how far to each side a horizontal error is sought that explains an alert; 0: never",
+    )
     p_md: float = Field(
         1e-3, gt=0, lt=1, description="probability of a missed detection that the stated MDB stands for"
     )

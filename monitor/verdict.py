@@ -11,7 +11,7 @@ class Verdict:
 
     `scans` is how many scans the pairs are from. `threshold` is that of the method's statistic, Q or N T / sigma^2.
     `mdb_bins` is the minimum detectable bias of the published test, with the plain rms of the calibration. The limits
-    of the unmatched shares and the levels are there with a calibration that has them.
+    of the unmatched shares are there with a calibration that has them. `offset_...` is `offset.Offset`, of an alert.
     """
 
     scan: int
@@ -32,3 +32,6 @@ class Verdict:
     level: float | None
     mdb_bins: float | None
     calibration: str
+    offset_north_m: float | None = None
+    offset_east_m: float | None = None
+    offset_confidence: float | None = None

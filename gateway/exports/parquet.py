@@ -79,6 +79,9 @@ VERDICTS = pa.schema(
                 "unmatched_dem_limit",
                 "level",
                 "mdb_bins",
+                "offset_north_m",
+                "offset_east_m",
+                "offset_confidence",
             )
         ),
         ("calibration", pa.string()),
