@@ -25,8 +25,8 @@ def ceilings(height_m: NDArray[np.float32]) -> NDArray[np.float32]:
     rows, columns = (size // BLOCK for size in height_m.shape)
     if min(rows, columns) < 3:
         return np.empty((0, 0), np.float32)
-    whole = height_m[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK)
-    tops = whole.max(axis=3).max(axis=1)
+    tops = np.maximum.reduce([height_m[k : rows * BLOCK : BLOCK] for k in range(BLOCK)])
+    tops = np.maximum.reduce([tops[:, k : columns * BLOCK : BLOCK] for k in range(BLOCK)])
     tops = np.maximum(np.maximum(tops[:-2], tops[1:-1]), tops[2:])
     return np.ascontiguousarray(np.maximum(np.maximum(tops[:, :-2], tops[:, 1:-1]), tops[:, 2:]))
 
