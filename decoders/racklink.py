@@ -17,8 +17,7 @@ from cobs import cobs
 
 from decoders import formats as f
 from decoders.framing import HEADER, Packet, PacketFramer, Packets
-from decoders.kernels429 import entries
-from decoders.kernels_link import CRC_RESIDUE, described, intact
+from decoders.kernels_link import CRC_RESIDUE, described, entries, intact
 
 __all__ = [
     "ChannelCount",
@@ -266,19 +265,16 @@ def words429(packet: Packet) -> TimedWords:
     return TimedWords(time_ns, pairs["word"], leftover, leftover == 0 and 1 <= count <= f.LINK_MAX_WORDS)
 
 
-def joined429(
-    times_ns: npt.NDArray[np.int64], offsets_ns: npt.NDArray[np.int64], sizes: npt.NDArray[np.int64], bodies: bytes
-) -> Joined:
-    """The words of ARINC 429 packets (m,) of given device times, within 292 years, and bodies one behind the other.
+def joined429(packet: Packet, offset_ns: int) -> Joined:
+    """The words of an ARINC 429 packet of a device time within 292 years.
 
-    Offsets (m,) lead from device times to the common ones.
+    The offset leads from device times to the common ones.
     """
-    most = len(bodies) // ENTRY_429.itemsize
+    most = len(packet.body) // ENTRY_429.itemsize
     time_ns, sent_ns, words = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.uint32)
-    count, malformed, left_out = entries(
-        times_ns, offsets_ns, sizes, np.frombuffer(bodies, np.uint8), time_ns, sent_ns, words
-    )
-    return Joined(time_ns[:count], sent_ns[:count], words[:count], malformed, left_out)
+    body = np.frombuffer(packet.body, np.uint8)
+    count, malformed, left_out = entries(body, 0, len(body), packet.time_ns, offset_ns, time_ns, sent_ns, words, 0)
+    return Joined(time_ns[:count], sent_ns[:count], words[:count], int(malformed), left_out)
 
 
 def radar_word(packet: Packet) -> RadarWord:

@@ -155,9 +155,9 @@ def test_most_packets_of_a_flight_are_taken_many_at_once(monkeypatch: pytest.Mon
     packets = Counter[str]()
     count_plain, count = Link.count_plain, Link.count
 
-    def many(link: Link, batch: Packets, own: NDArray[np.intp]) -> None:
+    def many(link: Link, batch: Packets, own: NDArray[np.intp], latest_ns: int) -> None:
         packets["many"] += len(own)
-        count_plain(link, batch, own)
+        count_plain(link, batch, own, latest_ns)
 
     def one(link: Link, packet: Packet) -> bool:
         packets["one"] += 1
