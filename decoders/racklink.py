@@ -7,7 +7,7 @@ body is not what its type says, so that the caller can count it; its bytes stay 
 import re
 import struct
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from typing import Any, ClassVar, Final, Literal, NamedTuple
 
@@ -133,27 +133,26 @@ class Framer(PacketFramer):
 
     def feed(self, data: bytes) -> list[Packet]:
         """Packets completed by the next bytes of a stream (COBS, each closed by 0x00)."""
-        decoded, found, _ = self._unstuff([data])
+        decoded, found, _ = self._unstuff(data)
         if not len(found):
             return []
         whole, new = decoded.tobytes(), tuple.__new__
         return [new(Packet, _fields(size)(whole, begin)) for begin, size, _ in found.tolist()]
 
-    def frame(self, chunks: Sequence[bytes]) -> Packets:
-        """Packets completed by the next chunks of a stream."""
-        decoded, found, carried = self._unstuff(chunks)
+    def frame(self, data: npt.NDArray[np.uint8], ends: npt.NDArray[np.int64]) -> Packets:
+        """Packets completed by the next chunks of a stream, which lie one behind the other and end at `ends`."""
+        decoded, found, carried = self._unstuff(data.data)
         header, chunk = np.empty(len(found), HEADER), np.empty(len(found), np.int64)
-        ends = np.fromiter(map(len, chunks), np.int64, len(chunks)).cumsum()
         described(decoded, found, ends + carried, header.view(np.uint64).reshape(-1, 2), chunk)
         return Packets(header, found[:, 0] + f.LINK_HEADER_BYTES, found[:, 1] - SHORTEST, chunk, decoded)
 
-    def _unstuff(self, chunks: Sequence[bytes]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64], int]:
+    def _unstuff(self, new: bytes | memoryview) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64], int]:
         """A copy of the stream in which packets lie without COBS; of each (n, 3) start, size, and the place behind it.
 
         And how many bytes of earlier chunks come before these. A compiled loop takes intact runs, which nearly all are.
         """
         carried = bytes(self._run)
-        stream = b"".join([carried, *chunks])
+        stream = b"".join((carried, new))
         self.received += len(stream) - len(carried)
         at = len(carried) if self._overlong else 0
         if not self._overlong:

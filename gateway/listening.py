@@ -5,15 +5,15 @@ waits and is called before anything changes how words are to be read, and `read_
 called as soon as one may end its sweep.
 """
 
-from collections import Counter
 from collections.abc import Callable, Sequence
-from operator import attrgetter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from decoders import formats as f
 from decoders.racklink import ENTRY_429, MalformedBody, Packet, heartbeat, hello, joined429, radar_word
 from gateway.channels import Channel429, Channel708
+from gateway.chunks import DROPPED_BEFORE, MONOTONIC_NS, NUMBER, Chunks
 from gateway.config import RackConfig, profile_of
 from gateway.hearing import QUIET_NS, RADAR, Hearing
 from gateway.link import SPOILT, Link
@@ -26,6 +26,7 @@ from monitor.quantities import are_distinct
 
 Place = tuple[str, int]  # adapter and channel
 WORTH_WHILE = 4  # packets: fewer are taken sooner one by one
+LATEST_HOST_NS = np.uint64(np.iinfo(np.int64).max)
 MOST_HEARTBEATS = 16  # taken at once
 
 
@@ -98,29 +99,46 @@ class Listener:
         for packet in link.framer.feed(record.data):
             self._packet(link, packet, record)
 
-    def framed(self, records: Sequence[Raw]) -> Batch:
-        """The packets that chunks of known adapters complete, before which nothing was dropped; for `take_all`."""
-        return framed([*self.links.values()], records)
+    def alone(self, chunks: Chunks) -> list[int]:
+        """The chunks that must be taken one by one.
 
-    def take_all(self, records: Sequence[Raw], batch: Batch) -> None:
+        What was dropped before a chunk is owned up to by the next verdict, and not by one before.
+        """
+        dropped, monotonic_ns = chunks.columns[DROPPED_BEFORE], chunks.columns[MONOTONIC_NS]
+        unusual = (self._link_of(chunks) < 0) | (dropped > 0) | (monotonic_ns > LATEST_HOST_NS)
+        return np.flatnonzero(unusual).tolist()
+
+    def _link_of(self, chunks: Chunks) -> NDArray[np.int64]:
+        """Which of the links each chunk came from, -1 for an adapter that is not known."""
+        found = [self._numbers.get(chunks.adapters[number], -1) for number in range(len(chunks.adapters))]
+        of: NDArray[np.int64] = np.array(found, np.int64)[chunks.columns[NUMBER].astype(np.intp)]
+        return of
+
+    def framed(self, chunks: Chunks) -> Batch:
+        """The packets that chunks complete of which none must be taken alone; for `take_all`."""
+        return framed([*self.links.values()], self._link_of(chunks), chunks)
+
+    def take_all(self, chunks: Chunks, batch: Batch) -> None:
         """Take chunks and their packets: the same as one by one, and sooner."""
-        for name, count in Counter(map(attrgetter("adapter"), records)).items():
-            self.links[name].counters["chunks"] += count
-        for name, record in {record.adapter: record for record in records}.items():  # the last of each
-            self.hearing.bytes_came(name, record.stamp.monotonic_ns)
+        numbers, monotonic_ns = self._link_of(chunks), chunks.columns[MONOTONIC_NS]
+        for number, (name, link) in enumerate(self.links.items()):
+            own = np.flatnonzero(numbers == number)
+            if len(own):
+                link.counters["chunks"] += len(own)
+                self.hearing.bytes_came(name, int(monotonic_ns[own[-1]]))
         links = [*self.links.values()]
         at, end = 0, len(batch.link)
         while at < end:
             if end - at >= WORTH_WHILE:
-                at += self._take_plain(links, records, batch.rest(at))
+                at += self._take_plain(links, chunks, batch.rest(at))
             if at < end:
-                record = records[batch.record[at]]
+                record = chunks.record(batch.record[at])
                 self._telling.begin(record)
                 self._packet(links[batch.link[at]], batch.packets.packet(at), record)
                 at += 1
-        self._telling.begin(records[-1])
+        self._telling.begin(chunks.record(len(chunks) - 1))
 
-    def _take_plain(self, links: Sequence[Link], records: Sequence[Raw], batch: Batch) -> int:
+    def _take_plain(self, links: Sequence[Link], chunks: Chunks, batch: Batch) -> int:
         """Take the packets in front of which there is nothing to say; how many these are."""
         ways, radials = self._ways(), self.radials
         newest = np.empty(len(ways.channels), np.int64)
@@ -145,7 +163,7 @@ class Listener:
                 self.hearing.heard(link.config.name, int(batch.host_ns[own[-1]]))
         for beat in arrived[:beats].tolist():
             self._count_words(ways, beat[1:])
-            self._telling.begin(records[batch.record[beat[0]]])
+            self._telling.begin(chunks.record(batch.record[beat[0]]))
             self._heartbeat(links[batch.link[beat[0]]], batch.packets.packet(beat[0]))
         self._count_words(ways, arrived[beats, 1:].tolist())
         if len(newest) and (latest := newest.max()) >= 0:

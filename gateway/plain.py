@@ -17,8 +17,8 @@ from decoders.framing import Packets, columns
 from decoders.kernels_link import ENTRY_BYTES, MOST_WORDS, entries
 from decoders.racklink import COUNT, Joined
 from gateway.channels import Channel429, Channel708
+from gateway.chunks import MONOTONIC_NS, Chunks
 from gateway.link import GOES_BACK_NS, SEQUENCE_RANGE, Link
-from gateway.records import Raw
 from gateway.timebase import begins_anew, follow
 from monitor import scans
 
@@ -83,19 +83,17 @@ class Laid(NamedTuple):
         return Joined(self.time_ns[begin:end], self.sent_ns[begin:end], self.words[begin:end], malformed, left_out)
 
 
-def framed(links: Sequence[Link], records: Sequence[Raw]) -> Batch:
-    """The packets that some records complete, of adapters that `links` has."""
-    if not records:
+def framed(links: Sequence[Link], numbers: NDArray[np.int64], chunks: Chunks) -> Batch:
+    """The packets that chunks complete; `numbers` (n,) has which of the links each came from."""
+    if not len(chunks):
         return Batch(columns([], []), *np.empty((3, 0), np.int64))
-    numbers = {link.config.name: number for number, link in enumerate(links)}
-    _, stamps, adapters, chunks, _ = zip(*records, strict=True)
     parts, link, record, base = [], [], [], 0
-    for adapter in dict.fromkeys(adapters):
-        own = [k for k, other in enumerate(adapters) if other == adapter]
-        part = links[numbers[adapter]].framer.frame([chunks[k] for k in own])
+    for number in np.flatnonzero(np.bincount(numbers)).tolist():
+        own = np.flatnonzero(numbers == number)
+        part = links[number].framer.frame(*chunks.stream(own))
         parts.append(part._replace(start=part.start + base))
-        link.append(np.full(len(part.header), numbers[adapter]))
-        record.append(np.array(own)[part.chunk])
+        link.append(np.full(len(part.header), number))
+        record.append(own[part.chunk])
         base += len(part.data)
     packets = Packets(*map(_joined, zip(*parts, strict=True)))
     links_of, records_of = _joined(link), _joined(record)
@@ -103,8 +101,7 @@ def framed(links: Sequence[Link], records: Sequence[Raw]) -> Batch:
         order = np.argsort(records_of, kind="stable")
         links_of, records_of = links_of[order], records_of[order]
         packets = packets.of(order)
-    host_ns = np.array([monotonic_ns for monotonic_ns, _ in stamps], np.int64)[records_of]
-    return Batch(packets, links_of, records_of, host_ns)
+    return Batch(packets, links_of, records_of, chunks.columns[MONOTONIC_NS].astype(np.int64)[records_of])
 
 
 def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from decoders import formats as f
 from decoders.framing import Packets
 from decoders.racklink import Framer, Packet
+from gateway.chunks import Block
 from gateway.config import check_config
 from gateway.link import Link
 from gateway.metadata import build_monitor
@@ -121,7 +122,7 @@ def given(records: list[Record], sizes: list[int], tells_state: bool = True) -> 
     for size in cycle(sizes):
         if at >= len(records):
             break
-        events = made.feed(records[at]) if size == 1 else made.feed_all(records[at : at + size])
+        events = made.feed(records[at]) if size == 1 else made.feed_all(Block.of([records[at : at + size]]))
         lines += [event.to_json() for event in events]
         at += size
     return lines + [event.to_json() for event in made.finish()]
