@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gateway.records import Raw, Record, Stamp
 
 COLUMNS: Final = 7
+MOST_BYTES: Final = 8 << 20  # of a block, and what a run has more
 SEQUENCE, MONOTONIC_NS, UTC_NS, DROPPED_BEFORE, NUMBER, BEGIN, END = range(COLUMNS)
 
 
@@ -78,6 +79,11 @@ class Chunks:
         out = np.empty(behind[-1], np.uint8)
         copy(data, begins, ends, out)
         return out, behind
+
+    @property
+    def size(self) -> int:
+        """How many bytes there are."""
+        return int((self.columns[END] - self.columns[BEGIN]).sum())
 
     def __len__(self) -> int:
         """How many there are."""
@@ -148,14 +154,15 @@ def _pieces(records: Iterable[Record]) -> Iterator[Chunks | Record]:
 
 
 def blocks(runs: Iterable[Run], records: int) -> Iterator[Block]:
-    """Runs in blocks of at least so many records, but for the last one."""
-    held, count = list[Run](), 0
+    """Runs in blocks of at least so many records, but for the last one and such as are large."""
+    held, count, size = list[Run](), 0, 0
     for run in runs:
         held.append(run)
         count += len(run)
-        if count >= records:
+        size += run.size if isinstance(run, Chunks) else 0
+        if count >= records or size >= MOST_BYTES:
             yield Block.of(held)
-            held, count = [], 0
+            held, count, size = [], 0, 0
     if held:
         yield Block.of(held)
 
