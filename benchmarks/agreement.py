@@ -5,10 +5,11 @@ It needs gdal-bin from the system's packages; minutes, most of them xarray-spati
 
 import sys
 
-from benchmarks import blockage, geodesy, line_of_sight
+from benchmarks import blockage, geodesy, line_of_sight, viewshed_speed
 
 SECTIONS = {
     "Shadows in line of sight": line_of_sight.section,
+    "Its speed beside gdal_viewshed": viewshed_speed.section,
     "Places on the Earth": geodesy.section,
     "The beam and the ground": blockage.section,
 }
@@ -16,7 +17,9 @@ SECTIONS = {
 
 def report() -> str:
     """All figures as Markdown. Leaves with a message if a program that is not a Python package is missing."""
-    return "\n".join(line for title, section in SECTIONS.items() for line in ("", f"### {title}", "", *section())).strip()
+    return "\n".join(
+        line for title, section in SECTIONS.items() for line in ("", f"### {title}", "", *section())
+    ).strip()
 
 
 def main() -> None:

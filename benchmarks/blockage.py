@@ -34,19 +34,20 @@ def section() -> list[str]:
     rows = [f"| {name} | " + " | ".join(map(str, row)) + " |" for name, row in zip(NAMES, counts, strict=True)]
     borders = _near_border(ours) | _near_border(theirs)
     return [
-        f"Beside wradlib {version('wradlib')} (`beam_block_frac`, accumulated): one scan of the reference configuration,",
-        f"{RADIALS} radials all round x {BINS} bins, beam {BEAM.width_deg:g} degrees. A bin of wradlib's is clear while the",
-        "accumulated blockage is 0, lit where it grows, and in shadow where it does not or is total.",
+        f"Beside wradlib {version('wradlib')} (`beam_block_frac`, accumulated): one scan of the reference",
+        f"configuration, {RADIALS} radials all round x {BINS} bins, beam {BEAM.width_deg:g} degrees. A bin of",
+        "wradlib's is clear while the accumulated blockage is 0, lit where it grows, and in shadow where it does not",
+        "or is total.",
         "",
         "| bins, ours down | " + " | ".join(f"wradlib: {name}" for name in NAMES) + " |",
         "|---|---|---|---|",
         *rows,
         "",
         f"{np.mean(ours == theirs):.1%} of all bins agree, and {np.mean((ours == theirs)[~borders]):.2%} of the",
-        f"{np.mean(~borders):.0%} that are more than {NEAR_BINS} bins from any change. The rest: wradlib takes the ground of a bin",
-        "where the beam's axis is at that range, the thread where the ground itself is, so a bin's ground differs where the",
-        "beam looks down or the ground rises steeply; and wradlib's beam edges are arcs added to the height of its axis on",
-        "a sphere, the thread's are tangents on the ellipsoid.",
+        f"{np.mean(~borders):.0%} that are more than {NEAR_BINS} bins from any change. The rest differ because wradlib",
+        "takes the ground of a bin where the beam's axis is at that range and the thread where the ground itself is,",
+        "and because wradlib's beam edges are arcs added to the height of its axis on a sphere and the thread's are",
+        "tangents on the ellipsoid.",
     ]
 
 
@@ -64,8 +65,9 @@ def scan() -> tuple[Kinds, Kinds]:
     range_m = (np.arange(BINS) + 0.5) * RANGE_NM * NM_M / BINS
     axis_m = bin_altitude(range_m, radar.tilt_deg, flight.height_m)
     along_m = np.broadcast_to(bin_distance(range_m, radar.tilt_deg, flight.height_m), states.shape)
-    starts = (np.full(states.shape, value) for value in (flight.longitude_deg, flight.latitude_deg))
-    lon, lat, _ = Geod(ellps="WGS84").fwd(*starts, np.broadcast_to(azimuth_deg[:, None], states.shape), along_m)
+    start_lon, start_lat = np.full(states.shape, flight.longitude_deg), np.full(states.shape, flight.latitude_deg)
+    azimuths_deg = np.broadcast_to(azimuth_deg[:, None], states.shape)
+    lon, lat, _ = Geod(ellps="WGS84").fwd(start_lon, start_lat, azimuths_deg, along_m)
     with np.errstate(invalid="ignore"):  # of a root where the beam is clear or blocked, which it then writes over
         share = beam_block_frac(terrain.elevation(lat, lon), axis_m, half_power_radius(range_m, BEAM.width_deg))
     total = cum_beam_block_frac(share)
@@ -82,4 +84,3 @@ def _near_border(kinds: Kinds) -> NDArray[np.bool_]:
         near[:, apart:] |= other
         near[:, :-apart] |= other
     return near
-

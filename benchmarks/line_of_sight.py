@@ -47,12 +47,14 @@ class Agreement(NamedTuple):
 def section() -> list[str]:
     """The report's lines, as Markdown."""
     versions = ", ".join(f"{name} ({found()})" for name, (found, _) in TOOLS.items())
+    heights = " and ".join(f"{height:g}" for height in ABOVE_GROUND_M)
     lines = [
-        f"Beside {versions}: a beam of {BEAM.width_deg:g} degrees at tilt 0 sees whatever is in line of sight, with the",
-        f"same refraction (k = {BEAM.refraction_k:.3f}). The programs work on the terrain warped to {CELLS_A_POST} cells a post in",
-        f"metres about the observer. {RADIALS} radials x {BINS} bins at {PLACES} drawn places a terrain, at",
-        f"{' and '.join(f'{h:g}' for h in ABOVE_GROUND_M)} m above ground. A bin is off the edges where the program sees",
-        "all cells within a post of the bin's ground, or none of them; edges of ours excuse nothing.",
+        f"Beside {versions}: a beam of {BEAM.width_deg:g} degrees at tilt 0 sees whatever is",
+        f"in line of sight, with the same refraction (k = {BEAM.refraction_k:.3f}). The programs work on the terrain",
+        f"warped to {CELLS_A_POST} cells a post, in metres about the observer. {RADIALS} radials x {BINS} bins at",
+        f"{PLACES} drawn places a terrain, at {heights} m above ground. A bin is",
+        "off the edges where the program sees all cells within a post of the bin's ground, or none of them; edges of",
+        "the thread's own excuse nothing.",
         "",
         "| terrain | program | bins off the edges | agree there | worst place and height | of all bins agree |",
         "|---|---|---|---|---|---|",

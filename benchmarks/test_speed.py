@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from benchmarks import viewsheds
+from benchmarks import viewshed_speed
 from benchmarks.limit import spin
 from decoders import arinc708
 from decoders.racklink import Framer
@@ -24,7 +24,6 @@ from simulators.scenario import BUILT_IN_TERRAIN
 
 RADIALS, BINS, RANGE_NM = 361, 512, 10.0
 RNG = np.random.default_rng(1)
-POST_M = 90.0  # of SRTM
 PACKETS = 2000
 LONG_ENOUGH_S = 5.0  # that some rounds of work that fills a core fall into moments when nobody else shares it
 
@@ -161,37 +160,21 @@ def test_one_bilinear_look_a_bin(benchmark: BenchmarkFixture, grid: Grid) -> Non
     benchmark(lambda: _look(grid, lat, -71.7))
 
 
-@pytest.fixture(scope="module")
-def tile(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The ground within the range of the scan, in metres and no finer than its posts, as gdal_viewshed has it."""
-    path = tmp_path_factory.mktemp("tile") / "terrain.tif"
-    here = 44.37514, -71.71874
-    viewsheds.write(viewsheds.surroundings(BUILT_IN_TERRAIN["white_mountains"], *here, RANGE_NM * NM_M, POST_M), path)
-    return path
+LINE_OF_SIGHT = "line of sight all round: the call at least 20 times as long, and 8 times without its start"
 
 
-@pytest.mark.benchmark(group="line of sight all round: at least 20 times the call, 8 times the call less its start")
-def test_terrain_thread_all_round(benchmark: BenchmarkFixture, grid: Grid) -> None:
-    ones = np.ones(360)
-    around = Pointing(44.37514 * ones, -71.71874 * ones, 761.0 * ones, np.radians(np.arange(360)), 0 * ones)
-    beam = Beam(width_deg=178.0, azimuth_fan=1)
-    assert thread(grid, around, beam).shape == (360, BINS)
-    benchmark(lambda: thread(grid, around, beam))
+@pytest.mark.benchmark(group=LINE_OF_SIGHT)
+def test_terrain_thread_all_round(benchmark: BenchmarkFixture) -> None:
+    scan = viewshed_speed.scan()
+    scan()
+    benchmark(scan)
 
 
-@pytest.mark.benchmark(group="line of sight all round: at least 20 times the call, 8 times the call less its start")
-def test_gdal_viewshed(benchmark: BenchmarkFixture, tile: Path) -> None:
-    seen = tile.with_name("seen.tif")
-    benchmark(lambda: viewsheds.run_gdal(tile, seen, 0.0, 0.0, 350.0))
-    assert seen.stat().st_size > 0
-
-
-@pytest.mark.benchmark(group="line of sight all round: at least 20 times the call, 8 times the call less its start")
-def test_start_of_gdal_viewshed_alone(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
-    small = tmp_path / "small.tif"
-    about = viewsheds.surroundings(BUILT_IN_TERRAIN["white_mountains"], 44.37514, -71.71874, POST_M, POST_M)
-    viewsheds.write(about, small)
-    benchmark(lambda: viewsheds.run_gdal(small, tmp_path / "seen.tif", 0.0, 0.0, 350.0))
+@pytest.mark.benchmark(group=LINE_OF_SIGHT)
+@pytest.mark.parametrize("ground", viewshed_speed.GROUNDS_M)
+def test_one_call_of_gdal_viewshed_on_the(benchmark: BenchmarkFixture, ground: str, tmp_path: Path) -> None:
+    benchmark(viewshed_speed.call(tmp_path, ground))
+    assert (tmp_path / "seen.tif").stat().st_size > 0
 
 
 @pytest.mark.benchmark(group="radar thread of one scan")

@@ -64,7 +64,9 @@ class Surroundings(NamedTuple):
         return float(np.sqrt(np.prod(radii)))
 
 
-def surroundings(terrain: Path, latitude_deg: float, longitude_deg: float, reach_m: float, cell_m: float) -> Surroundings:
+def surroundings(
+    terrain: Path, latitude_deg: float, longitude_deg: float, reach_m: float, cell_m: float
+) -> Surroundings:
     """The terrain as GDAL's bilinear warping gives it, a little wider than `reach_m` to each side of a place."""
     size = 2 * (int(reach_m / cell_m) + 4) + 1
     about = Surroundings(np.empty((size, size), np.float32), cell_m, latitude_deg, longitude_deg)

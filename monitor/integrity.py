@@ -9,6 +9,7 @@ from decoders.formats import MODES_708
 from monitor.aircraft import Aircraft
 from monitor.calibration import NO_CALIBRATION, Calibration, uncalibrated
 from monitor.comparison import Comparison, compare, thin
+from monitor.coverage import uncovered
 from monitor.disparity import (
     minimum_detectable_bias,
     normalised,
@@ -52,6 +53,7 @@ class Monitor:
         comparison, lost = compare(scan, chosen[usable], pointing, self.terrain, self.settings)
         if lost:
             reasons.append(f"{lost} radials leave the terrain or cross voids")
+        reasons += uncovered(self.terrain, pointing)
         return self._decide(scan, comparison, self._buried(pointing), reasons), comparison
 
     def _refusal(self, scan: Scan) -> str | None:
