@@ -10,6 +10,7 @@ from decoders.formats import MODES_708
 from monitor.aircraft import Aircraft
 from monitor.calibration import NO_CALIBRATION, Calibration, uncalibrated
 from monitor.comparison import Comparison, compare, thin
+from monitor.coverage import uncovered
 from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, Test, examine
 from monitor.disparity import statistic, threshold
 from monitor.geodesy import LONGEST_RANGE_NM
@@ -53,6 +54,7 @@ class Monitor:
         comparison, lost = compare(scan, chosen[usable], pointing, self.terrain, self.settings)
         if lost:
             reasons.append(f"{lost} radials leave the terrain or cross voids")
+        reasons += uncovered(self.terrain, pointing)
         verdict = self._decide(scan, comparison, self._buried(pointing), reasons)
         if verdict.verdict == ALERT and self.settings.offset_search_m:
             calibration = self.calibration or uncalibrated(scan.bins.shape[1])
