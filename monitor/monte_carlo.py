@@ -78,7 +78,7 @@ def simulate(grid: Grid, setup: Setup, runs: range) -> Outcome:
     parts = []
     for run in runs:
         rng = np.random.default_rng((setup.seed, run))
-        errors = _errors(rng, setup)
+        errors = draw_errors(rng, setup)
         noise = rng.standard_normal(grid.height_m.shape, np.float32) * np.float32(setup.post_noise_m)
         measured, left = _thread(grid._replace(height_m=grid.height_m + noise), setup, errors)
         stayed = ~(void | left)
@@ -110,7 +110,7 @@ def _cut(middle: float, reach: float, posts: int) -> tuple[int, int]:
     return max(0, math.floor(middle - reach)), min(posts, math.ceil(middle + reach) + 1)
 
 
-def _errors(rng: np.random.Generator, setup: Setup) -> list[NDArray[np.float64]]:
+def draw_errors(rng: np.random.Generator, setup: Setup) -> list[NDArray[np.float64]]:
     """An error of each variable: (1,) for all radials, and (n,) of the azimuth."""
     counts = [setup.radials if name == "azimuth_deg" else 1 for name in Variables._fields]
     return [

@@ -32,6 +32,7 @@ PAPER_BIN_M, PAPER_BINS, PAPER_SIZES = 144.8, 128, (3, 126)  # of 256 bins those
 EDGES = ("front", "back", "centre", "size")
 HEADINGS: Final = {
     "height (m MSL)": ("height_m", ".0f"),
+    "radials off the terrain": ("radials_that_left_the_terrain", "d"),
     "radials with a shadow": ("radials_with_a_shadow", "d"),
     "N": ("pairs", "d"),
     **{f"mean {edge}": (f"mean_{edge}_bins", ".2f") for edge in EDGES},

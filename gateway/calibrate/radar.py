@@ -20,9 +20,7 @@ from monitor.calibration import Calibration, fit
 from monitor.residuals import NORMALITY_TEST, moments, normality
 
 P_FAS = (1e-1, 1e-2, 1e-3)
-FLY = (
-    "fly level and low (a few hundred metres above the ground) over terrain of the class in question, radar in map mode"
-)
+FLY = "fly a few hundred metres above the ground over terrain of the class in question, with the radar in map mode"
 HEADINGS = ("range limit (NM)", "shadow size (bins)", "residuals", "mean (bins)", "sigma (bins)", "p if normal")
 EXPLANATION = f"""Residuals of shadow centres, radar minus terrain, in range bins, over all scans. Whole shadows up
 to the size and range limit are paired by their overlap, at most one pair a radial. The last column is the p value of
