@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import Result
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 from gateway.calibrate.dem import as_published, figures, monte_carlo, setup_of
 from gateway.calibrate.radar import calibration, material
