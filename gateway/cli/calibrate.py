@@ -23,17 +23,21 @@ def calibrate_radar(
     Prints the residuals of shadow centres by size and range limit. Half of the scans are fitted, the other half checks
     how often each P_FA would have alerted.
     """
+    from rich.progress import track
+
     from gateway.calibrate.page import Results, write_page
     from gateway.calibrate.radar import EXPLANATION, HEADINGS, calibration, histograms, material, table
     from gateway.calibrate.recorded import read
     from gateway.calibrate.workers import on_all_cores
     from gateway.config import load_config
     from gateway.reprocess.job import jobs
-    from gateway.tables import print_table
+    from gateway.tables import plain_console, print_table
 
-    rack = load_config(config) if config else None
+    # What is to be made need not be there yet.
+    rack = load_config(config).model_copy(update={"calibration": None}) if config else None
     listed = {job.path: job for source in recordings for job in jobs(source, rack, dem or ())}
-    reads = list(on_all_cores(read, listed.values()))
+    results = on_all_cores(read, listed.values())
+    reads = list(track(results, "recordings", len(listed), console=plain_console(), transient=True))
     for one in reads:
         if one.damage:
             typer.echo(f"{one.name}: {one.damage}; every whole record was used", err=True)
@@ -48,8 +52,8 @@ def calibrate_radar(
         typer.echo(f"P_FA {rate.p_fa:g}: {rate.alerts} alerts in the {rate.scans} scans that were not fitted")
     typer.echo(made.provenance)
     if report:
-        results = Results(f"Calibration {made.name}", made.provenance, EXPLANATION, HEADINGS, rows, histograms(found))
-        typer.echo(f"report: {write_page(report, results)}")
+        page = Results(f"Calibration {made.name}", made.provenance, EXPLANATION, HEADINGS, rows, histograms(found))
+        typer.echo(f"report: {write_page(report, page)}")
 
 
 def calibrate_dem(
@@ -60,7 +64,7 @@ def calibrate_dem(
     heights_m: Annotated[
         str | None, typer.Option(help="above mean sea level, as 1600,1800; 250 to 1050 m above the ground if not given")
     ] = None,
-    runs: Annotated[int, typer.Option(min=1, max=1_000_000, help="for each height")] = 100,
+    runs: Annotated[int, typer.Option(min=1, max=10_000, help="for each height")] = 100,
     paper: Annotated[bool, typer.Option("--paper", help="as published: no fan, flat Earth, no bus")] = False,
     bins: Annotated[int | None, typer.Option(min=16, max=1024, help="range bins of the radar, 512")] = None,
     range_nm: Annotated[float | None, typer.Option(min=1, max=320, help="range setting of the radar, 10")] = None,
@@ -73,11 +77,13 @@ def calibrate_dem(
 
     Prints the residuals of shadow edges, centres and sizes for each height.
     """
+    from rich.progress import track
+
     from gateway.calibrate import dem as study
     from gateway.calibrate.page import Results, write_page
     from gateway.config import load_config
     from gateway.errors import GatewayError
-    from gateway.tables import print_table
+    from gateway.tables import plain_console, print_table
     from monitor.monte_carlo import Variables
     from monitor.settings import MonitorSettings
     from monitor.terrain import TerrainError, open_terrain
@@ -94,11 +100,13 @@ def calibrate_dem(
     settings = rack.monitor if rack else MonitorSettings()
     setup = study.setup_of(true, settings, bins or 512, range_nm or 10.0, post_noise_m, seed)
     setup = study.as_published(setup) if paper else setup
-    found = list(study.monte_carlo(terrain.grid, setup, study.heights_of(heights_m, place), runs))
+    heights = study.heights_of(heights_m, place)
+    results = study.monte_carlo(terrain.grid, setup, heights, runs)
+    found = list(track(results, "heights", len(heights), console=plain_console(), transient=True))
     rows, said = study.table(found), study.provenance(terrain, setup, runs)
     print_table(list(study.HEADINGS), rows)
     output.write_text(study.file_text(output.stem, said, found), encoding="utf-8")
     typer.echo(said)
     if report:
-        results = Results(output.stem, said, study.EXPLANATION, list(study.HEADINGS), rows, study.histograms(found))
-        typer.echo(f"report: {write_page(report, results)}")
+        page = Results(output.stem, said, study.EXPLANATION, list(study.HEADINGS), rows, study.histograms(found))
+        typer.echo(f"report: {write_page(report, page)}")

@@ -92,7 +92,7 @@ def test_what_is_fitted_is_what_the_verdicts_of_a_replay_rest_on(flights: Path) 
 def test_a_recording_is_read_anew_with_another_rack_file(flights: Path, tmp_path: Path) -> None:
     rack = tmp_path / "rack.toml"
     rack.write_text(
-        f'terrain = ["{MOUNTAINS}"]\n[[adapters]]\nname = "bridge"\nsource = "serial:x"\n[monitor]\np_fa = 0.05\n'
+        f'terrain = ["{MOUNTAINS}"]\ncalibration = "not-yet.json"\n[[adapters]]\nname = "bridge"\nsource = "serial:x"\n[monitor]\np_fa = 0.05\n'
     )
     run = invoke("calibrate", "radar", flights, "-c", rack, "-o", tmp_path / "out.json", "--least-scans", "4")
     assert run.exit_code == 0, run.output
