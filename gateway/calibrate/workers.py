@@ -13,7 +13,10 @@ Result = TypeVar("Result")
 
 
 def on_all_cores(work: Callable[..., Result], *arguments: Iterable[Any]) -> Iterator[Result]:
-    """What `map` gives, in order, from processes of their own. Raises what the work raised, and GatewayError if one of them dies."""
+    """What `map` gives, in order, from processes of their own.
+
+    Raises what the work raised, and GatewayError if one of them dies.
+    """
     context = get_context("forkserver")
     context.set_forkserver_preload([work.__module__])  # so that it is imported once
     with ProcessPoolExecutor(len(os.sched_getaffinity(0)), context) as pool:

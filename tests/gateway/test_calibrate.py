@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections import Counter
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from typer.testing import CliRunner, Result
 from gateway.calibrate.dem import as_published, figures, monte_carlo, setup_of
 from gateway.calibrate.radar import calibration, material
 from gateway.calibrate.recorded import CELLS, Compared, Read, read
+from gateway.calibrate.workers import on_all_cores
 from gateway.cli import app
 from gateway.errors import GatewayError
 from gateway.events import IntegrityEvent
@@ -92,7 +94,8 @@ def test_what_is_fitted_is_what_the_verdicts_of_a_replay_rest_on(flights: Path) 
 def test_a_recording_is_read_anew_with_another_rack_file(flights: Path, tmp_path: Path) -> None:
     rack = tmp_path / "rack.toml"
     rack.write_text(
-        f'terrain = ["{MOUNTAINS}"]\ncalibration = "not-yet.json"\n[[adapters]]\nname = "bridge"\nsource = "serial:x"\n[monitor]\np_fa = 0.05\n'
+        f'terrain = ["{MOUNTAINS}"]\ncalibration = "not-made-yet.json"\n'
+        '[[adapters]]\nname = "bridge"\nsource = "serial:x"\n[monitor]\np_fa = 0.05\n'
     )
     run = invoke("calibrate", "radar", flights, "-c", rack, "-o", tmp_path / "out.json", "--least-scans", "4")
     assert run.exit_code == 0, run.output
@@ -156,6 +159,11 @@ def test_recordings_with_different_monitor_settings_are_refused() -> None:
     reads = [made("one", 1, scan(0)), made("two", 2, scan(0), p_fa=1e-3)]
     with pytest.raises(GatewayError, match="two and one have different monitor settings: give one rack file by -c"):
         calibration("name", reads, material(reads), 2)
+
+
+def test_a_worker_that_is_killed_ends_the_work_with_a_sentence() -> None:
+    with pytest.raises(GatewayError, match="was killed in its work: is the memory full"):
+        list(on_all_cores(os._exit, [9]))
 
 
 PAPER_RUN = ("calibrate", "dem", "--dem", MOUNTAINS, "--paper", "--runs", "30", "--heights-m", "765,1165")
