@@ -15,8 +15,11 @@ from benchmarks import viewshed_speed
 from benchmarks.limit import spin
 from decoders import arinc708
 from decoders.racklink import Framer
+from gateway.calibrate.dem import monte_carlo, setup_of
 from monitor.geodesy import NM_M
+from monitor.monte_carlo import Variables
 from monitor.prediction import Beam, Pointing, predict
+from monitor.settings import MonitorSettings
 from monitor.shade import radar_states
 from monitor.terrain import Grid, open_terrain, sample
 from simulators import racklink
@@ -175,6 +178,20 @@ def test_terrain_thread_all_round(benchmark: BenchmarkFixture) -> None:
 def test_one_call_of_gdal_viewshed_on_the(benchmark: BenchmarkFixture, ground: str, tmp_path: Path) -> None:
     benchmark(viewshed_speed.call(tmp_path, ground))
     assert (tmp_path / "seen.tif").stat().st_size > 0
+
+
+@pytest.mark.benchmark(group="Monte Carlo of five heights, 100 runs each of 360 radials")
+def test_monte_carlo(benchmark: BenchmarkFixture, grid: Grid) -> None:
+    setup = setup_of(Variables(44.5, -71.5), MonitorSettings(), BINS, RANGE_NM, post_noise_m=3.0, seed=1)
+    heights_m = (565.0, 765.0, 965.0, 1165.0, 1365.0)
+    # As long as it takes, once is enough.
+    rows = benchmark.pedantic(lambda: list(monte_carlo(grid, setup, heights_m, 100)))  # type: ignore[no-untyped-call]
+    assert [row.height_m for row in rows] == [*heights_m]
+
+
+@pytest.mark.benchmark(group="Monte Carlo of five heights, 100 runs each of 360 radials")
+def test_limit_of_20_s(benchmark: BenchmarkFixture) -> None:
+    benchmark.pedantic(lambda: spin(20.0))  # type: ignore[no-untyped-call]
 
 
 @pytest.mark.benchmark(group="radar thread of one scan")

@@ -43,3 +43,8 @@ def describe(event: Event) -> str:
 def clock(time_ns: int) -> str:
     """UTC to the millisecond."""
     return datetime.fromtimestamp(time_ns / 1e9, UTC).strftime("%H:%M:%S.%f")[:-3]
+
+
+def utc(time_ns: int) -> str:
+    """UTC with its date, to the second."""
+    return f"{datetime.fromtimestamp(time_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC"

@@ -4,7 +4,6 @@ import html
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -18,7 +17,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from decoders.profiles import Profile
-from gateway.console import clock
+from gateway.console import clock, utc
 from gateway.recording import Recording
 from monitor.calibration import Calibration
 from monitor.comparison import Comparison
@@ -132,17 +131,13 @@ thread: of the radar's, and of the terrain's. It is reported and not judged. <i>
 can be said, for the reason given; it is neither ok nor alert.</p>"""
 
 
-def _utc(time_ns: int) -> str:
-    return f"{datetime.fromtimestamp(time_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC"
-
-
 def _extent(leg: Flown) -> str:
     if not leg.pictures:
         return "no scan"
     first, last = leg.pictures[0], leg.pictures[-1]
     counts = Counter(picture.verdict.verdict for picture in leg.pictures)
     verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
-    return f"scans {first.verdict.scan} to {last.verdict.scan}, {_utc(first.utc_ns)} to {_utc(last.utc_ns)}, {verdicts}"
+    return f"scans {first.verdict.scan} to {last.verdict.scan}, {utc(first.utc_ns)} to {utc(last.utc_ns)}, {verdicts}"
 
 
 def _caption(title: str, picture: Picture) -> str:
@@ -150,7 +145,7 @@ def _caption(title: str, picture: Picture) -> str:
     bin_m = scan.range_nm * NM_M / shape[1]
     said = "; ".join((verdict.verdict, *verdict.reasons))
     return (
-        f"{title}: scan {verdict.scan}, {_utc(picture.utc_ns)}, verdict {said}. {shape[0]} radials of {shape[1]} "
+        f"{title}: scan {verdict.scan}, {utc(picture.utc_ns)}, verdict {said}. {shape[0]} radials of {shape[1]} "
         f"range bins of {bin_m:.1f} m."
     )
 
@@ -159,7 +154,7 @@ def _heading(title: str, picture: Picture) -> str:
     """Two lines: which scan, and its verdict."""
     v = picture.verdict
     why = f": {v.reasons[0]}" if v.verdict == UNAVAILABLE else ""
-    return f"{title}, scan {v.scan}, {_utc(picture.utc_ns)}\n{v.verdict}{why}"
+    return f"{title}, scan {v.scan}, {utc(picture.utc_ns)}\n{v.verdict}{why}"
 
 
 def _figure(name: str, heading: str, caption: str) -> str:
@@ -181,8 +176,8 @@ def _origins(legs: Sequence[Flown]) -> str:
 VERSIONS = ("shadebus", "numpy", "python")
 ORIGINS: dict[str, Callable[[Flown], str]] = {
     "recording": lambda leg: leg.recording.path.name,
-    "began": lambda leg: _utc(leg.began_ns),
-    "ended": lambda leg: _utc(leg.ended_ns),
+    "began": lambda leg: utc(leg.began_ns),
+    "ended": lambda leg: utc(leg.ended_ns),
     "terrain": lambda leg: ", ".join(path.name for path in leg.monitor.terrain.paths),
     "terrain checksum (CRC-32)": lambda leg: leg.monitor.terrain.checksum,
     "method": lambda leg: leg.monitor.settings.method,

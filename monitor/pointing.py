@@ -46,7 +46,19 @@ def point(
     if scan.stabilised:
         azimuth, elevation = np.radians(heading) + angle, np.full(len(lat), tilt)
     else:
-        look = (math.cos(tilt) * np.cos(angle), math.cos(tilt) * np.sin(angle), -math.sin(tilt) * ones)
-        east, north, up = body_to_enu(*look, roll, pitch, heading)
-        azimuth, elevation = np.arctan2(east, north), np.arcsin(np.clip(up, -1, 1))
+        azimuth, elevation = boresight(angle, tilt * ones, roll, pitch, heading)
     return Pointing(lat, lon, height, azimuth, elevation), usable, reasons
+
+
+def boresight(
+    scan_angle_rad: NDArray[np.float64],
+    tilt_rad: NDArray[np.float64],
+    roll_deg: NDArray[np.float64],
+    pitch_deg: NDArray[np.float64],
+    heading_deg: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Local-level azimuth and elevation (n,), radians, of an antenna that is fixed to the body but for its scan."""
+    level = np.cos(tilt_rad)
+    look = level * np.cos(scan_angle_rad), level * np.sin(scan_angle_rad), -np.sin(tilt_rad)
+    east, north, up = body_to_enu(*look, roll_deg, pitch_deg, heading_deg)
+    return np.arctan2(east, north), np.arcsin(np.clip(up, -1, 1))

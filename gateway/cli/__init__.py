@@ -7,6 +7,7 @@ from collections.abc import Callable
 import typer
 
 from gateway import kernel_cache
+from gateway.cli.calibrate import calibrate_dem, calibrate_radar
 from gateway.cli.cut import cut
 from gateway.cli.decode import decode_429, decode_708
 from gateway.cli.demo import demo
@@ -42,6 +43,11 @@ decode = typer.Typer(help="Explain one bus word, field by field.", no_args_is_he
 decode.command("429")(decode_429)
 decode.command("708")(decode_708)
 app.add_typer(decode, name="decode")
+
+calibrate = typer.Typer(help="Find how much disparity is normal.", no_args_is_help=True)
+calibrate.command("radar")(calibrate_radar)
+calibrate.command("dem")(calibrate_dem)
+app.add_typer(calibrate, name="calibrate")
 
 
 def main() -> None:

@@ -1,5 +1,6 @@
 """`shadebus thresholds`: what a configuration of the test can promise."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,6 +11,7 @@ def thresholds(
     sigma_c: Annotated[float | None, typer.Option(min=1e-6, help="sigma of a shadow centre, range bins")] = None,
     p_fa: Annotated[float | None, typer.Option(min=1e-12, max=0.5, help="probability of false alert")] = None,
     p_md: Annotated[float | None, typer.Option(min=1e-12, max=0.999, help="probability of missed detection")] = None,
+    plot: Annotated[Path | None, typer.Option(help="picture (PNG) of the MDB against N_D to write")] = None,
 ) -> None:
     """Print T_D and the minimum detectable bias; without options, the six configurations of the paper's Table 2."""
     from rich.table import Table
@@ -33,3 +35,7 @@ def thresholds(
         limit = threshold(count, alarm)
         table.add_row(f"{count}", f"{sigma:g}", f"{alarm:.0e}", f"{missed:.0e}", f"{limit:.2f}", f"{bias:.2f}")
     plain_console().print(table)
+    if plot:
+        from gateway.mdb_plot import Configuration, plot_mdb
+
+        plot_mdb(plot, [Configuration(*row) for row in rows])

@@ -54,7 +54,7 @@ def key(job: Job) -> str:
     A file counts as the same while its size and time of change are. Raises GatewayError as `work` does.
     """
     recording = Recording(job.path)
-    return _key(recording, *_set_up(job, recording))
+    return _key(recording, *set_up(job, recording))
 
 
 def _key(recording: Recording, config: RackConfig, monitor: Monitor | None) -> str:
@@ -68,7 +68,7 @@ def _key(recording: Recording, config: RackConfig, monitor: Monitor | None) -> s
 def work(job: Job) -> Outcome:
     """Decode and judge a recording from its first record to its last. Raises GatewayError naming what is wrong."""
     recording = Recording(job.path)
-    config, monitor = _set_up(job, recording)
+    config, monitor = set_up(job, recording)
     rows: list[dict[str, Any]] = []
     counters: dict[str, int] = {}
     scan: ScanEvent | None = None
@@ -103,8 +103,8 @@ def work(job: Job) -> Outcome:
     return Outcome(pa.Table.from_pylist(rows, COLUMNS), whole)
 
 
-def _set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
-    """How a recording is to be read and judged."""
+def set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
+    """How a recording is to be read and judged. Raises GatewayError naming what is wrong."""
     recorded = recorded_config(recording.metadata)
     config = RackConfig.model_validate_json(job.config) if job.config else recorded
     names, given = ({adapter.name for adapter in one.adapters} for one in (recorded, config))
@@ -150,9 +150,10 @@ def code_version() -> str:
     return digest.hexdigest()
 
 
-def jobs(directory: Path, config: RackConfig | None, terrain: Iterable[Path]) -> list[Job]:
-    """A job for each recording below a directory. Raises GatewayError if there is none."""
-    paths = [session[0] for session in sessions(directory.rglob("*.mcap"))]
+def jobs(source: Path, config: RackConfig | None, terrain: Iterable[Path]) -> list[Job]:
+    """A job for each recording below a directory, or for one recording. Raises GatewayError if there is none."""
+    directory = source.parent if source.is_file() else source
+    paths = [source] if source.is_file() else [session[0] for session in sessions(directory.rglob("*.mcap"))]
     if not paths:
         raise GatewayError(f"{directory} holds no recordings (*.mcap): name the directory that they are in")
     written = json.dumps(config.model_dump(mode="json")) if config else ""

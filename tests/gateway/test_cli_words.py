@@ -27,6 +27,8 @@ VERBS = (
     "thresholds",
     "devices",
     "doctor",
+    "calibrate radar",
+    "calibrate dem",
     "decode 429",
     "decode 708",
 )

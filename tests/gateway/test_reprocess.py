@@ -14,43 +14,18 @@ import duckdb
 import pyarrow.parquet as pq
 import pytest
 
-from gateway.config import check_config
 from gateway.events import IntegrityEvent
-from gateway.metadata import build_monitor, describe, recorded_config, recorded_monitor
-from gateway.recording import Recorder, Recording
-from gateway.records import Raw, Record, Stamp, Status, Tick
+from gateway.metadata import recorded_config, recorded_monitor
+from gateway.recording import Recording
 from gateway.replay import replay
 from gateway.reprocess import job as job_module
 from gateway.reprocess.dataset import DataSet
 from gateway.reprocess.job import Job, jobs, key, work
 from gateway.reprocess.run import reprocess
-from simulators.carriers import stream
-from simulators.link import units
-from simulators.scenario import BUILT_IN_TERRAIN, Radar, white_mountains
+from tests.gateway.flown import record_flight
 from tests.gateway.shell import shadebus
 
-SWEEP_S = 61 * 3 / 40
-SECOND_NS = 1_000_000_000
 COUNT = 4
-
-
-def fly(path: Path, seed: int) -> None:
-    """Record a flight of two sweeps, in chunks of 20 ms."""
-    table = {"adapters": [{"name": "bridge", "source": "serial:x"}], "terrain": [BUILT_IN_TERRAIN["white_mountains"]]}
-    config = check_config(table, "test")
-    scenario = white_mountains(2 * SWEEP_S, seed=seed).model_copy(update={"radar": Radar(step_deg=3.0)})
-    chunks: dict[int, bytes] = {}
-    for ready_ns, data in units(scenario, stream()):
-        chunks[ready_ns // 20_000_000] = chunks.get(ready_ns // 20_000_000, b"") + data
-    records: list[Record] = [Status(0, Stamp(0, seed), "bridge", "UP")]
-    for chunk, data in chunks.items():
-        stamp = Stamp(chunk * 20_000_000, chunk * 20_000_000 + seed)
-        records.append(Raw(len(records), stamp, "bridge", data))
-        if chunk % 50 == 49:
-            records.append(Tick(len(records), stamp))
-    recorder = Recorder(path, describe(config, build_monitor(config)))
-    recorder.append(records)
-    recorder.close()
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +33,7 @@ def flights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("flights")
     (directory / "second").mkdir()
     for seed in range(COUNT):
-        fly(directory / ("second" if seed % 2 else "") / f"flight{seed}.mcap", seed)
+        record_flight(directory / ("second" if seed % 2 else "") / f"flight{seed}.mcap", seed)
     return directory
 
 
