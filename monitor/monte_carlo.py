@@ -80,7 +80,7 @@ def simulate(grid: Grid, setup: Setup, runs: range) -> Outcome:
         rng = np.random.default_rng((setup.seed, run))
         errors = draw_errors(rng, setup)
         noise = rng.standard_normal(grid.height_m.shape, np.float32) * np.float32(setup.post_noise_m)
-        measured, left = _thread(grid._replace(height_m=grid.height_m + noise), setup, errors)
+        measured, left = _thread(grid.with_heights(grid.height_m + noise), setup, errors)
         stayed = ~(void | left)
         found = residuals(measured[stayed], reference[stayed], setup.sizes, setup.pairing)
         count = len(np.unique(whole(reference[stayed], setup.sizes)["radial"]))
@@ -98,8 +98,7 @@ def around(grid: Grid, setup: Setup) -> Grid:
     east = (setup.true.longitude_deg - grid.west_deg) / grid.column_deg
     top, bottom = _cut(north, high / grid.row_deg, grid.height_m.shape[0])
     left, right = _cut(east, wide / grid.column_deg, grid.height_m.shape[1])
-    return grid._replace(
-        height_m=np.ascontiguousarray(grid.height_m[top:bottom, left:right]),
+    return grid.with_heights(np.ascontiguousarray(grid.height_m[top:bottom, left:right]))._replace(
         north_deg=grid.north_deg - top * grid.row_deg,
         west_deg=grid.west_deg + left * grid.column_deg,
     )

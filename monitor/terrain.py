@@ -47,6 +47,10 @@ class Grid(NamedTuple):
     column_deg: float
     ceiling_m: NDArray[np.float32] = NO_CEILING
 
+    def with_heights(self, height_m: NDArray[np.float32]) -> "Grid":
+        """Other heights in the same places, of which no ceilings are known."""
+        return self._replace(height_m=height_m, ceiling_m=NO_CEILING)
+
 
 class Terrain:
     """Stored terrain heights. Made by `open_terrain`."""

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter, zoom
 
-from monitor.ceiling import ceilings
 from monitor.scans import Scan
 from monitor.terrain import Grid
 
@@ -51,8 +50,7 @@ def moved(grid: Grid, distance_m: float, direction: int) -> Grid:
 
 
 def _heights(grid: Grid, height_m: NDArray[np.floating]) -> Grid:
-    single = np.ascontiguousarray(height_m, np.float32)
-    return grid._replace(height_m=single, ceiling_m=ceilings(single))
+    return grid.with_heights(np.ascontiguousarray(height_m, np.float32))
 
 
 def _shift(size: float) -> Fault:
