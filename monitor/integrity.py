@@ -49,9 +49,8 @@ class Monitor:
         reasons += _gaps(scan)
         if not usable.any():
             return self.unavailable(scan.number, reasons), None
-        comparison, lost = compare(scan, chosen[usable], pointing, self.terrain, self.settings)
-        if lost:
-            reasons.append(f"{lost} radials leave the terrain or cross voids")
+        comparison, left_out = compare(scan, chosen[usable], pointing, self.terrain, self.settings)
+        reasons += left_out
         return self._decide(scan, comparison, self._buried(pointing), reasons), comparison
 
     def _refusal(self, scan: Scan) -> str | None:

@@ -39,6 +39,12 @@ class MonitorSettings(BaseModel):
     radial_spacing_deg: float = Field(3.0, gt=0, le=30, description="one radial in every so many degrees enters T")
     minimum_size: int = Field(3, ge=1, description="smallest shadow used, range bins")
     maximum_size: int | None = Field(None, ge=1, description="largest shadow used, range bins")
+    minimum_width_deg: float = Field(
+        0.0, ge=0, le=180, description="a shadow counts if overlapping ones of neighbouring radials reach so far across"
+    )
+    pairing: Literal["overlap", "first"] = Field(
+        "overlap", description="shadows pair by overlap, or first against first: the paper's calibration"
+    )
     range_limit_nm: float | None = Field(
         None, gt=0, description="ignore everything beyond; the range setting if not set"
     )
