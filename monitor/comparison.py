@@ -1,7 +1,8 @@
 """Both threads of one scan side by side: what the radar saw, what the stored terrain predicts, and the pairs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +10,12 @@ from numpy.typing import NDArray
 from monitor.geodesy import NM_M
 from monitor.prediction import Beam, Pointing, predict
 from monitor.scans import Scan
-from monitor.screening import screen
+from monitor.screening import NO_SCREENS, Screens, screen
 from monitor.settings import MonitorSettings
-from monitor.shade import pair, pair_first, radar_states, shadows, unmatched_share
+from monitor.shade import DEM_INITIAL, pair, pair_first, radar_states, shadows, unmatched_share
 from monitor.terrain import Terrain
 
-PAIRINGS: Final = {"overlap": pair, "first": pair_first}
+PAIRINGS: Final[dict[str, Callable[[Any, Any], NDArray[np.void]]]] = {"overlap": pair, "first": pair_first}
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,12 @@ class Comparison:
 
 
 def compare(
-    scan: Scan, radials: NDArray[np.intp], pointing: Pointing, terrain: Terrain, settings: MonitorSettings
+    scan: Scan,
+    radials: NDArray[np.intp],
+    pointing: Pointing,
+    terrain: Terrain,
+    settings: MonitorSettings,
+    screens: Screens = NO_SCREENS,
 ) -> tuple[Comparison, list[str]]:
     """Compare on some radials of a scan, (n,) like the pointing; and what of it was left out, and why."""
     s, bins = settings, scan.bins.shape[1]
@@ -48,7 +54,11 @@ def compare(
     beam = Beam(s.beam_width_deg, s.azimuth_fan, s.azimuth_span, s.refraction_k, s.range_reference)
     dem, void = predict(terrain.grid, pointing, limit, scan.range_nm * NM_M / bins, beam)
     dem, radials = dem[~void], radials[~void]
-    angles, radar = scan.scan_angle_deg[radials], radar_states(scan.bins[radials, :limit])
+    angles, echoes = scan.scan_angle_deg[radials], scan.bins[radials, :limit]
+    if screens.bins_left_out is not None:
+        near = np.arange(limit) < screens.bins_left_out[~void, None]
+        echoes[near], dem[near] = 0, DEM_INITIAL  # the radials begin there, but nearer ground still casts its shadow
+    radar = radar_states(echoes)
     seen = shadows(radar, "radar", s.minimum_size, s.maximum_size)
     predicted = shadows(dem, "dem", s.minimum_size, s.maximum_size)
     counts = screen(seen, predicted, angles, s)

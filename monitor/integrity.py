@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from decoders.arinc708 import misread_bits
 from decoders.formats import MODES_708
@@ -17,10 +18,13 @@ from monitor.disparity import (
     statistic,
     threshold,
 )
-from monitor.geodesy import LONGEST_RANGE_NM
+from monitor.geodesy import LONGEST_RANGE_NM, NM_M
 from monitor.pointing import point
 from monitor.prediction import Pointing
+from monitor.quantities import RADIO_HEIGHT
+from monitor.radio_altitude import first_bins, too_high
 from monitor.scans import Scan
+from monitor.screening import Screens
 from monitor.settings import MonitorSettings
 from monitor.terrain import Terrain
 from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
@@ -49,8 +53,14 @@ class Monitor:
         reasons += _gaps(scan)
         if not usable.any():
             return self.unavailable(scan.number, reasons), None
-        comparison, left_out = compare(scan, chosen[usable], pointing, self.terrain, self.settings)
-        reasons += left_out
+        chosen = chosen[usable]
+        limit_m = self.settings.radio_altitude_limit_m
+        height_m = aircraft.tracks[RADIO_HEIGHT.name].at(scan.time_ns[chosen]).value
+        if limit_m is not None and (high := too_high(height_m, limit_m)):
+            return self.unavailable(scan.number, [high, *reasons]), None
+        screens, told = self._screens(scan, pointing, height_m)
+        comparison, left_out = compare(scan, chosen, pointing, self.terrain, self.settings, screens)
+        reasons += [*told, *left_out]
         return self._decide(scan, comparison, self._buried(pointing), reasons), comparison
 
     def _refusal(self, scan: Scan) -> str | None:
@@ -65,6 +75,17 @@ class Monitor:
         if bits := misread_bits(scan.bins):
             return f"the range bins look like {bits} bits each: check radar_profile, or the channel's profile"
         return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm) if self.calibration else None
+
+    def _screens(
+        self, scan: Scan, pointing: Pointing, height_over_ground_m: NDArray[np.float64]
+    ) -> tuple[Screens, list[str]]:
+        """What decides which bins and shadows of a scan count, and what is to be said of it."""
+        s = self.settings
+        if not s.first_bin_from_radio_altitude:
+            return Screens(), []
+        bin_width_m = scan.range_nm * NM_M / scan.bins.shape[1]
+        near, told = first_bins(height_over_ground_m, pointing.elevation_rad, s.beam_width_deg, bin_width_m)
+        return Screens(near), told
 
     def _decide(self, scan: Scan, comparison: Comparison, doubts: list[str], reasons: list[str]) -> Verdict:
         s, d = self.settings, comparison.disparities

@@ -16,6 +16,15 @@ from monitor.width import are_wide
 Which = NDArray[np.bool_]
 
 
+class Screens(NamedTuple):
+    """What decides which bins and shadows count, beside the settings."""
+
+    bins_left_out: NDArray[np.intp] | None = None  # at the beginning of each radial (n,)
+
+
+NO_SCREENS = Screens()
+
+
 class Screened(NamedTuple):
     """Which shadows of the radar (k,) and of the terrain (m,) count, and how many do not and why."""
 

@@ -48,6 +48,12 @@ class MonitorSettings(BaseModel):
     range_limit_nm: float | None = Field(
         None, gt=0, description="ignore everything beyond; the range setting if not set"
     )
+    radio_altitude_limit_m: float | None = Field(
+        None, gt=0, le=20_000, description="height over ground (label 164) above which nothing is compared; no limit"
+    )
+    first_bin_from_radio_altitude: bool = Field(
+        False, description="leave out the bins that lie nearer than the beam's lower edge meets flat ground"
+    )
     lever_arm: LeverArm = LeverArm()
     height_source: HeightSource = Field(
         "076", description="label of the GNSS height: 076 above mean sea level, or 370 above the ellipsoid, with EGM96"
@@ -65,6 +71,11 @@ class MonitorSettings(BaseModel):
         if self.maximum_size is not None and self.maximum_size < self.minimum_size:
             raise ValueError(f"maximum_size {self.maximum_size} is below minimum_size {self.minimum_size}")
         return self
+
+    @property
+    def uses_radio_altitude(self) -> bool:
+        """Whether a radial needs the radio altimeter."""
+        return self.radio_altitude_limit_m is not None or self.first_bin_from_radio_altitude
 
     @property
     def pairs_needed(self) -> int:

@@ -22,6 +22,10 @@ def states(lit: list[list[bool]]) -> NDArray[np.int8]:
     return radar_states(np.array(lit, np.uint8))
 
 
+def levels(drawn: str) -> NDArray[np.uint8]:
+    return np.array([*drawn], np.uint8)
+
+
 def radar_oracle(levels: list[int]) -> list[int]:
     """Dark before the first echo is not known to be shadow."""
     first = next((j for j, level in enumerate(levels) if level), len(levels))
@@ -255,8 +259,8 @@ def test_shadows_before_the_first_echo_or_in_the_unseen_tail_of_the_other_thread
 
 def test_first_against_first_pairs_what_lies_apart_and_passes_over_a_larger_overlap() -> None:
     """Radial 0: first ones apart, later ones alike. Radial 1: no radar shadow. Radial 2: they share bins 4 and 5."""
-    radar = shadows(states([[1, 0, 1, 1, 1, 1, 0, 0, 0, 1], [1] * 10, [1, 1, 0, 0, 0, 1, 1, 0, 1, 1]]), "radar")
-    dem = shadows(states([[1, 1, 1, 0, 1, 1, 0, 0, 0, 1], [1, 0] + [1] * 8, [1, 1, 1, 0, 0, 0, 1, 1, 0, 1]]), "dem")
+    radar = shadows(radar_states(np.array([*map(levels, ("1011110001", "1111111111", "1100011011"))])), "radar")
+    dem = shadows(radar_states(np.array([*map(levels, ("1110110001", "1011111111", "1110001101"))])), "dem")
     assert pair_first(radar, dem).tolist() == [(0, 0, 0, 0), (2, 2, 3, 2)]
     assert pair(radar, dem).tolist() == [(0, 1, 1, 3), (2, 2, 3, 2)]
 

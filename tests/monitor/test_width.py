@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from monitor.shade import radar_states, shadows
 from monitor.width import are_wide
@@ -20,7 +21,8 @@ def wide(dark: list[tuple[int, int] | None], angles: list[float], minimum_deg: f
     for radial, shadow in zip(bins, dark, strict=True):
         if shadow:
             radial[shadow[0] - 1 : shadow[1]] = 0
-    return are_wide(shadows(radar_states(bins), "radar"), np.array(angles, float), SPACING_DEG, minimum_deg).tolist()
+    found = shadows(radar_states(bins), "radar")
+    return [bool(one) for one in are_wide(found, np.array(angles, float), SPACING_DEG, minimum_deg)]
 
 
 def test_three_radials_three_degrees_apart_make_six_degrees() -> None:
@@ -71,7 +73,7 @@ def test_widths_are_those_of_the_definition(lit: list[list[bool]], minimum_deg: 
                 row.add(at)
                 at += way
         expected.append((max(row) - min(row)) * SPACING_DEG >= minimum_deg)
-    angles = np.arange(len(lit)) * SPACING_DEG
+    angles: NDArray[np.float64] = np.arange(len(lit), dtype=np.float64) * SPACING_DEG
     assert are_wide(found, angles, SPACING_DEG, minimum_deg).tolist() == expected
     assert are_wide(found, -angles, SPACING_DEG, minimum_deg).tolist() == expected
 
