@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from monitor.geodesy import NM_M
 from monitor.prediction import Beam, Pointing, predict
 from monitor.scans import Scan
-from monitor.screening import NO_SCREENS, Screens, screen
+from monitor.screening import NO_SCREENS, Scene, Screens, screen
 from monitor.settings import MonitorSettings
 from monitor.shade import DEM_INITIAL, pair, pair_first, radar_states, shadows, unmatched_share
 from monitor.terrain import Terrain
@@ -50,9 +50,10 @@ def compare(
 ) -> tuple[Comparison, list[str]]:
     """Compare on some radials of a scan, (n,) like the pointing; and what of it was left out, and why."""
     s, bins = settings, scan.bins.shape[1]
+    bin_width_m = scan.range_nm * NM_M / bins
     limit = bins if s.range_limit_nm is None else max(1, min(bins, int(bins * s.range_limit_nm / scan.range_nm)))
     beam = Beam(s.beam_width_deg, s.azimuth_fan, s.azimuth_span, s.refraction_k, s.range_reference)
-    dem, void = predict(terrain.grid, pointing, limit, scan.range_nm * NM_M / bins, beam)
+    dem, void = predict(terrain.grid, pointing, limit, bin_width_m, beam)
     dem, radials = dem[~void], radials[~void]
     angles, echoes = scan.scan_angle_deg[radials], scan.bins[radials, :limit]
     if screens.bins_left_out is not None:
@@ -61,7 +62,8 @@ def compare(
     radar = radar_states(echoes)
     seen = shadows(radar, "radar", s.minimum_size, s.maximum_size)
     predicted = shadows(dem, "dem", s.minimum_size, s.maximum_size)
-    counts = screen(seen, predicted, angles, s)
+    scene = Scene(angles, Pointing(*(column[~void] for column in pointing)), bin_width_m)
+    counts = screen(seen, predicted, scene, s, screens)
     counted, expected = seen[counts.radar], predicted[counts.dem]
     # Range-limited shadows stay out before pairing: one of them must not take the place of a whole one.
     whole, foreseen = counted[~counted["range_limited"]], expected[~expected["range_limited"]]

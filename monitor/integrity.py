@@ -28,19 +28,25 @@ from monitor.screening import Screens
 from monitor.settings import MonitorSettings
 from monitor.terrain import Terrain
 from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
+from monitor.water import Water
 
 MOST_UNMATCHED = 0.6  # share of shadows; without a calibration more of them forbid an ok
 
 
 class Monitor:
-    """Holds the terrain, the calibration and the settings, and judges scans."""
+    """Holds the terrain with its large water, the calibration and the settings, and judges scans."""
 
     def __init__(
-        self, terrain: Terrain, settings: MonitorSettings | None = None, calibration: Calibration | None = None
+        self,
+        terrain: Terrain,
+        settings: MonitorSettings | None = None,
+        calibration: Calibration | None = None,
+        water: Water | None = None,
     ) -> None:
         self.terrain = terrain
         self.settings = settings or MonitorSettings()
         self.calibration = calibration
+        self.water = water
 
     def judge(self, scan: Scan, aircraft: Aircraft) -> tuple[Verdict, Comparison | None]:
         """The verdict on a scan; the comparison is None where the radar or the state did not allow one."""
@@ -82,10 +88,10 @@ class Monitor:
         """What decides which bins and shadows of a scan count, and what is to be said of it."""
         s = self.settings
         if not s.first_bin_from_radio_altitude:
-            return Screens(), []
+            return Screens(water=self.water), []
         bin_width_m = scan.range_nm * NM_M / scan.bins.shape[1]
         near, told = first_bins(height_over_ground_m, pointing.elevation_rad, s.beam_width_deg, bin_width_m)
-        return Screens(near), told
+        return Screens(near, self.water), told
 
     def _decide(self, scan: Scan, comparison: Comparison, doubts: list[str], reasons: list[str]) -> Verdict:
         s, d = self.settings, comparison.disparities

@@ -10,7 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from monitor.prediction import Pointing
 from monitor.settings import MonitorSettings
+from monitor.water import Water
 from monitor.width import are_wide
 
 Which = NDArray[np.bool_]
@@ -20,9 +22,18 @@ class Screens(NamedTuple):
     """What decides which bins and shadows count, beside the settings."""
 
     bins_left_out: NDArray[np.intp] | None = None  # at the beginning of each radial (n,)
+    water: Water | None = None
 
 
 NO_SCREENS = Screens()
+
+
+class Scene(NamedTuple):
+    """The radials in use (n,): their scan angles, where the antenna was and looked, and how wide a bin is."""
+
+    scan_angle_deg: NDArray[np.float64]
+    pointing: Pointing
+    bin_width_m: float
 
 
 class Screened(NamedTuple):
@@ -34,11 +45,11 @@ class Screened(NamedTuple):
 
 
 def screen(
-    seen: NDArray[np.void], predicted: NDArray[np.void], scan_angle_deg: NDArray[np.float64], settings: MonitorSettings
+    seen: NDArray[np.void], predicted: NDArray[np.void], scene: Scene, settings: MonitorSettings, screens: Screens
 ) -> Screened:
-    """Judge the shadows of both threads on the radials in use (n,)."""
+    """Judge the shadows of both threads. A reason counts all that it is true of, whatever else is."""
     radar, dem, reasons = np.ones(len(seen), bool), np.ones(len(predicted), bool), []
-    for radar_counts, dem_counts, why in _rules(seen, predicted, scan_angle_deg, settings):
+    for why, radar_counts, dem_counts in _judged(seen, predicted, scene, settings, screens):
         out = np.count_nonzero(~radar_counts), np.count_nonzero(~dem_counts)
         if any(out):
             reasons.append(f"{out[0]} radar and {out[1]} terrain shadows do not count: {why}")
@@ -46,11 +57,14 @@ def screen(
     return Screened(radar, dem, reasons)
 
 
-def _rules(
-    seen: NDArray[np.void], predicted: NDArray[np.void], scan_angle_deg: NDArray[np.float64], s: MonitorSettings
-) -> Iterator[tuple[Which, Which, str]]:
-    if s.minimum_width_deg:
-        radar, dem = (
-            are_wide(found, scan_angle_deg, s.radial_spacing_deg, s.minimum_width_deg) for found in (seen, predicted)
-        )
-        yield radar, dem, f"narrower than {s.minimum_width_deg:g} degrees"
+def _judged(
+    seen: NDArray[np.void], predicted: NDArray[np.void], scene: Scene, s: MonitorSettings, screens: Screens
+) -> Iterator[tuple[str, Which, Which]]:
+    threads = seen, predicted
+    if minimum_deg := s.minimum_width_deg:
+        angles, spacing_deg = scene.scan_angle_deg, s.radial_spacing_deg
+        radar, dem = (are_wide(found, angles, spacing_deg, minimum_deg) for found in threads)
+        yield f"narrower than {minimum_deg:g} degrees", radar, dem
+    if water := screens.water:
+        radar, dem = (~water.below(found, scene.pointing, scene.bin_width_m) for found in threads)
+        yield f"over water of {s.minimum_water_km2:g} square kilometres or more", radar, dem

@@ -54,6 +54,9 @@ class MonitorSettings(BaseModel):
     first_bin_from_radio_altitude: bool = Field(
         False, description="leave out the bins that lie nearer than the beam's lower edge meets flat ground"
     )
+    minimum_water_km2: float = Field(
+        1.0, ge=0, le=1e9, description="the rack's water counts as water from this size on, square kilometres"
+    )
     lever_arm: LeverArm = LeverArm()
     height_source: HeightSource = Field(
         "076", description="label of the GNSS height: 076 above mean sea level, or 370 above the ellipsoid, with EGM96"

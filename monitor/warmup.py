@@ -38,4 +38,4 @@ def warm_up(monitor: Monitor) -> None:
     builder = ScanBuilder()
     scans = [*builder.feed(np.full(n, SECOND_NS // 20), radials), *builder.finish()]
     settings = monitor.settings.model_copy(update={"minimum_pairs": 2, "position_gate": False})
-    Monitor(monitor.terrain, settings).judge(scans[-1], aircraft)
+    Monitor(monitor.terrain, settings, water=monitor.water).judge(scans[-1], aircraft)
