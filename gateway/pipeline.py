@@ -53,7 +53,7 @@ class Pipeline:
         tells_state: bool = True,
     ) -> None:
         self._config = config
-        self._monitor = monitor
+        self._monitor = monitor and monitor.anew()
         self._watcher = watcher
         self._tells_state = tells_state
         self._telling: Telling = before._telling if before else Telling()
@@ -154,6 +154,7 @@ class Pipeline:
         """All older state is worthless."""
         self._judge(self._scans.finish())
         self.aircraft = Aircraft(self._config.monitor.height_source)
+        self._monitor = self._monitor and self._monitor.anew()
         self._echo.forget()
         reason = f"the bridge's clock began anew at {time_ns / 1e9:.3f} s; the state before it is dropped"
         self._troubles[f"clock of {adapter}"] = f"degraded: {adapter}: {reason}"

@@ -62,7 +62,7 @@ def compare(
     radar = radar_states(echoes)
     seen = shadows(radar, "radar", s.minimum_size, s.maximum_size)
     predicted = shadows(dem, "dem", s.minimum_size, s.maximum_size)
-    scene = Scene(angles, Pointing(*(column[~void] for column in pointing)), bin_width_m)
+    scene = Scene(terrain.grid, angles, Pointing(*(column[~void] for column in pointing)), bin_width_m)
     counts = screen(seen, predicted, scene, s, screens)
     counted, expected = seen[counts.radar], predicted[counts.dem]
     # Range-limited shadows stay out before pairing: one of them must not take the place of a whole one.

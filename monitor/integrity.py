@@ -1,6 +1,8 @@
 """One scan, the aircraft's state and the terrain to a verdict: does the stored terrain agree with the radar?"""
 
 import math
+from copy import copy
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +29,7 @@ from monitor.scans import Scan
 from monitor.screening import Screens
 from monitor.settings import MonitorSettings
 from monitor.terrain import Terrain
+from monitor.tracking import ShadowTracker, fronts_of
 from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
 from monitor.water import Water
 
@@ -47,6 +50,13 @@ class Monitor:
         self.settings = settings or MonitorSettings()
         self.calibration = calibration
         self.water = water
+        self._tracker = ShadowTracker(self.settings.tracked_scans)
+
+    def anew(self) -> Self:
+        """The same monitor without a memory of scans: for another recording, or after a clock that began anew."""
+        other = copy(self)
+        other._tracker = ShadowTracker(self.settings.tracked_scans)
+        return other
 
     def judge(self, scan: Scan, aircraft: Aircraft) -> tuple[Verdict, Comparison | None]:
         """The verdict on a scan; the comparison is None where the radar or the state did not allow one."""
@@ -67,6 +77,10 @@ class Monitor:
         screens, told = self._screens(scan, pointing, height_m)
         comparison, left_out = compare(scan, chosen, pointing, self.terrain, self.settings, screens)
         reasons += [*told, *left_out]
+        if self.settings.tracked_scans > 1:
+            every, known, _ = point(scan, aircraft, steady, self.settings)
+            fronts = fronts_of(scan, steady[known], every, self.terrain.grid, self.settings)
+            self._tracker.add(int(scan.time_ns[-1]), fronts)
         return self._decide(scan, comparison, self._buried(pointing), reasons), comparison
 
     def _refusal(self, scan: Scan) -> str | None:
@@ -86,12 +100,12 @@ class Monitor:
         self, scan: Scan, pointing: Pointing, height_over_ground_m: NDArray[np.float64]
     ) -> tuple[Screens, list[str]]:
         """What decides which bins and shadows of a scan count, and what is to be said of it."""
-        s = self.settings
+        s, before = self.settings, self._tracker.before(int(scan.time_ns[0]))
         if not s.first_bin_from_radio_altitude:
-            return Screens(water=self.water), []
+            return Screens(None, self.water, before), []
         bin_width_m = scan.range_nm * NM_M / scan.bins.shape[1]
         near, told = first_bins(height_over_ground_m, pointing.elevation_rad, s.beam_width_deg, bin_width_m)
-        return Screens(near, self.water), told
+        return Screens(near, self.water, before), told
 
     def _decide(self, scan: Scan, comparison: Comparison, doubts: list[str], reasons: list[str]) -> Verdict:
         s, d = self.settings, comparison.disparities

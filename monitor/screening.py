@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from monitor.prediction import Pointing
 from monitor.settings import MonitorSettings
+from monitor.terrain import Grid
+from monitor.tracking import Fronts, front_points
 from monitor.water import Water
 from monitor.width import are_wide
 
@@ -23,14 +25,16 @@ class Screens(NamedTuple):
 
     bins_left_out: NDArray[np.intp] | None = None  # at the beginning of each radial (n,)
     water: Water | None = None
+    before: tuple[Fronts, ...] = ()  # of the scans before, as far as shadows are tracked
 
 
 NO_SCREENS = Screens()
 
 
 class Scene(NamedTuple):
-    """The radials in use (n,): their scan angles, where the antenna was and looked, and how wide a bin is."""
+    """The terrain and the radials in use (n,): scan angles, where the antenna was and looked, and how wide a bin is."""
 
+    grid: Grid
     scan_angle_deg: NDArray[np.float64]
     pointing: Pointing
     bin_width_m: float
@@ -68,3 +72,11 @@ def _judged(
     if water := screens.water:
         radar, dem = (~water.below(found, scene.pointing, scene.bin_width_m) for found in threads)
         yield f"over water of {s.minimum_water_km2:g} square kilometres or more", radar, dem
+    if (scans := s.tracked_scans - 1) > 0:
+        points_m = front_points(seen, scene.pointing, scene.grid, scene.bin_width_m)
+        held = [fronts.hold(points_m, s.tracking_tolerance_m) for fronts in screens.before]
+        enough = np.full(len(seen), len(held) == scans)
+        why = f"no front there in each of {scans} scans before"
+        if len(held) < scans:
+            why += f", of which there are {len(held)}"
+        yield why, np.logical_and.reduce([enough, *held]), np.ones(len(predicted), bool)

@@ -57,6 +57,14 @@ class MonitorSettings(BaseModel):
     minimum_water_km2: float = Field(
         1.0, ge=0, le=1e9, description="the rack's water counts as water from this size on, square kilometres"
     )
+    tracked_scans: int = Field(
+        1, ge=1, le=20, description="a radar shadow counts if so many scans in a row have its front; 1 tracks nothing"
+    )
+    # Three bins of 10 NM / 512, beyond which an edge is another one; half the way between radials half a degree apart,
+    # 81 m at 10 NM, lies within. It must stay below what the aircraft flies in a sweep: 180 m at 90 m/s and 2 s.
+    tracking_tolerance_m: float = Field(
+        110.0, gt=0, le=10_000, description="within which a front is at the same place on the ground in the next scan"
+    )
     lever_arm: LeverArm = LeverArm()
     height_source: HeightSource = Field(
         "076", description="label of the GNSS height: 076 above mean sea level, or 370 above the ellipsoid, with EGM96"
