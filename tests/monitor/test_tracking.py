@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from pyproj import Geod
 
 from decoders.formats import MODES_708
+from monitor import warmup
 from monitor.aircraft import Aircraft
+from monitor.comparison import Comparison
 from monitor.integrity import Monitor
 from monitor.pointing import NEEDED
 from monitor.prediction import Pointing
@@ -186,3 +188,25 @@ def test_scans_without_a_front_are_scans_all_the_same() -> None:
     assert tracker.before(3)[1].hold(np.array([[3.0, 4, 0], [3, 4, 1e-3], [np.nan] * 3]), 5.0).tolist() == [
         True, False, False,
     ]  # fmt: skip
+
+
+def test_a_monitor_of_every_option_is_warmed_up_by_a_whole_comparison(
+    white_mountains: Terrain, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A made-up scan that one of the options refuses would leave kernels to be compiled while the first scan waits."""
+    compared: list[Comparison | None] = []
+
+    class Watched(Monitor):
+        def judge(self, scan: Scan, aircraft: Aircraft) -> tuple[Verdict, Comparison | None]:
+            verdict, comparison = super().judge(scan, aircraft)
+            compared.append(comparison)
+            return verdict, comparison
+
+    monkeypatch.setattr(warmup, "Monitor", Watched)
+    settings = MonitorSettings(
+        tracked_scans=2, minimum_width_deg=3, radio_altitude_limit_m=762, first_bin_from_radio_altitude=True
+    )
+    monitor = Monitor(white_mountains, settings)
+    warmup.warm_up(monitor)
+    assert [bool(one) for one in compared] == [True]
+    assert not monitor._tracker._before
