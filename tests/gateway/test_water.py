@@ -10,6 +10,7 @@ from gateway.config import RackConfig, check_config
 from gateway.errors import GatewayError
 from gateway.metadata import build_monitor, describe, recorded_config, recorded_monitor
 from gateway.recording import Recorder, Recording
+from gateway.recording.merging import merge
 from gateway.records import Stamp, Status
 from gateway.reprocess.job import Job, key
 from simulators.scenario import BUILT_IN_TERRAIN
@@ -96,11 +97,10 @@ def test_recordings_with_different_water_are_not_merged(tmp_path: Path) -> None:
     for name, north in (("a", 44.6), ("b", 44.7)):
         record(tmp_path / f"{name}.mcap", rack([lake(tmp_path / f"{name}.geojson", north)]))
     record(tmp_path / "none.mcap", rack([]))
-    run = shadebus("merge", tmp_path / "a.mcap", tmp_path / "b.mcap", "-o", tmp_path / "out.mcap")
-    assert run.returncode == 1
-    assert "a.mcap and b.mcap were recorded with a different water" in run.stderr
-    run = shadebus("merge", tmp_path / "none.mcap", tmp_path / "a.mcap", "-o", tmp_path / "out.mcap")
-    assert run.returncode == 0, run.stderr
+    one, other, without = (Recording(tmp_path / f"{name}.mcap") for name in ("a", "b", "none"))
+    with pytest.raises(GatewayError, match=r"a\.mcap and b\.mcap were recorded with a different water"):
+        merge([one, other], tmp_path / "out.mcap")
+    merge([without, one], tmp_path / "out.mcap")
     merged = Recording(tmp_path / "out.mcap").metadata
-    assert merged["water_checksum"] == Recording(tmp_path / "a.mcap").metadata["water_checksum"]
+    assert merged["water_checksum"] == one.metadata["water_checksum"]
     assert recorded_config(merged).water == (tmp_path / "a.geojson",)
