@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from monitor.geodesy import NM_M
 from monitor.prediction import Beam, Pointing, predict
+from monitor.sample import ScanSample, Unmatched, signal_level
 from monitor.scans import Scan
 from monitor.screening import NO_SCREENS, Scene, Screens, screen
 from monitor.settings import MonitorSettings
@@ -31,13 +32,17 @@ class Comparison:
     pair_radial: NDArray[np.int64]
     radar_centre: NDArray[np.float64]
     dem_centre: NDArray[np.float64]
-    unmatched_radar: float | None
-    unmatched_dem: float | None
+    unmatched_radar: Unmatched
+    unmatched_dem: Unmatched
 
     @property
     def disparities(self) -> NDArray[np.float64]:
         """D of eq. (6), range bins."""
         return self.radar_centre - self.dem_centre
+
+    def sample(self, scan: Scan) -> ScanSample:
+        """What the tests look at, of the scan that was compared."""
+        return ScanSample(self.disparities, self.unmatched_radar, self.unmatched_dem, signal_level(scan.bins))
 
 
 def compare(
@@ -76,8 +81,8 @@ def compare(
         pairs["radial"],
         whole["centre"][pairs["radar"]],
         foreseen["centre"][pairs["dem"]],
-        _share(*unmatched_share(counted, predicted, dem)),
-        _share(*unmatched_share(expected, seen, radar)),
+        Unmatched(*unmatched_share(counted, predicted, dem)),
+        Unmatched(*unmatched_share(expected, seen, radar)),
     ), [*lost, *counts.reasons]
 
 
@@ -89,7 +94,3 @@ def thin(scan_angle_deg: NDArray[np.float64], spacing_deg: float) -> NDArray[np.
     cell = np.round(scan_angle_deg / spacing_deg)
     order = np.lexsort((np.abs(scan_angle_deg - cell * spacing_deg), cell))
     return np.sort(order[np.diff(cell[order], prepend=-np.inf) > 0])
-
-
-def _share(unmatched: int, eligible: int) -> float | None:
-    return unmatched / eligible if eligible else None
