@@ -3,7 +3,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test rig-test lint bench evidence integrity sensitivity latency load full-load hours soak crash rebaseline calibration dbc setup lock clean
+.PHONY: demo test rig-test lint bench evidence integrity sensitivity latency load full-load hours soak crash agreement cold-start
+.PHONY: rebaseline calibration dbc setup lock clean
 
 demo: $(READY)
 	$(BIN)/shadebus demo
@@ -64,6 +65,14 @@ crash: $(READY)
 # The events of the golden recordings as they are now, and what changed; the recordings stay.
 rebaseline: $(READY)
 	$(BIN)/python -m tests.golden.rebaseline
+
+# The terrain thread beside programs of others, on real terrain; needs gdal-bin, and minutes.
+agreement: $(READY)
+	$(BIN)/python -m benchmarks.agreement
+
+# How soon the gateway answers after its start, with compiled kernels kept and without.
+cold-start: $(READY)
+	$(BIN)/python -m benchmarks.cold_start
 
 # The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
 calibration: $(READY)

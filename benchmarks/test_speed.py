@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
+from benchmarks import viewshed_speed
 from benchmarks.limit import spin
 from decoders import arinc708
 from decoders.racklink import Framer
@@ -157,6 +158,23 @@ def test_one_bilinear_look_a_bin(benchmark: BenchmarkFixture, grid: Grid) -> Non
     lat = latitudes(RADIALS * BINS)
     assert _look(grid, lat, -71.7) > 0
     benchmark(lambda: _look(grid, lat, -71.7))
+
+
+LINE_OF_SIGHT = "line of sight all round: the call at least 20 times as long, and 8 times without its start"
+
+
+@pytest.mark.benchmark(group=LINE_OF_SIGHT)
+def test_terrain_thread_all_round(benchmark: BenchmarkFixture) -> None:
+    scan = viewshed_speed.scan()
+    scan()
+    benchmark(scan)
+
+
+@pytest.mark.benchmark(group=LINE_OF_SIGHT)
+@pytest.mark.parametrize("ground", viewshed_speed.GROUNDS_M)
+def test_one_call_of_gdal_viewshed_on_the(benchmark: BenchmarkFixture, ground: str, tmp_path: Path) -> None:
+    benchmark(viewshed_speed.call(tmp_path, ground))
+    assert (tmp_path / "seen.tif").stat().st_size > 0
 
 
 @pytest.mark.benchmark(group="radar thread of one scan")

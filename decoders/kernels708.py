@@ -15,22 +15,29 @@ from decoders.results708 import Header, Meanings
 Int = int | np.int64
 Array = npt.NDArray[Any]
 Bytes = npt.NDArray[np.uint8]
-Place = tuple[int, int]
+Place = tuple[Int, Int]
 Parts = tuple[Array, Array, Array]
 
+
+def _field(name: str) -> Place:
+    """Where a field is. Of plain numbers the compiler would make all of a function anew for each field: seconds."""
+    first, width = f.HEADER_708[name]
+    return np.int64(first), np.int64(width)
+
+
 HEADER_BYTES: Final = f.HEADER_708_BYTES
-LABEL: Final = f.HEADER_708["label"]
-CONTROL_ACCEPT: Final = f.HEADER_708["control_accept"]
-SLAVE: Final = f.HEADER_708["slave"]
-ANNUNCIATIONS: Final = f.HEADER_708["annunciations"]
-FAULTS: Final = f.HEADER_708["faults"]
-STABILISED: Final = f.HEADER_708["stabilised"]
-MODE: Final = f.HEADER_708["mode"]
-TILT: Final = f.HEADER_708["tilt"]
-GAIN: Final = f.HEADER_708["gain"]
-RANGE: Final = f.HEADER_708["range"]
-DATA_ACCEPT: Final = f.HEADER_708["data_accept"]
-SCAN_ANGLE: Final = f.HEADER_708["scan_angle"]
+LABEL: Final = _field("label")
+CONTROL_ACCEPT: Final = _field("control_accept")
+SLAVE: Final = _field("slave")
+ANNUNCIATIONS: Final = _field("annunciations")
+FAULTS: Final = _field("faults")
+STABILISED: Final = _field("stabilised")
+MODE: Final = _field("mode")
+TILT: Final = _field("tilt")
+GAIN: Final = _field("gain")
+RANGE: Final = _field("range")
+DATA_ACCEPT: Final = _field("data_accept")
+SCAN_ANGLE: Final = _field("scan_angle")
 SPARES: Final = tuple(f.SPARE_708.values())
 UNKNOWN_LABEL: Final = f.UNUSUAL_708.index("unknown_label")
 RESERVED_MODE: Final = f.UNUSUAL_708.index("reserved_mode")

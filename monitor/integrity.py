@@ -13,6 +13,7 @@ from decoders.formats import MODES_708
 from monitor.aircraft import Aircraft
 from monitor.calibration import NO_CALIBRATION, Calibration, uncalibrated
 from monitor.comparison import Comparison, compare, thin
+from monitor.coverage import uncovered
 from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, Test, examine
 from monitor.disparity import statistic, threshold
 from monitor.geodesy import LONGEST_RANGE_NM, NM_M
@@ -82,7 +83,7 @@ class Monitor:
             return self.unavailable(scan.number, [high, *reasons]), None
         screens, told = self._screens(scan, pointing, height_m)
         comparison, left_out = compare(scan, chosen, pointing, self.terrain, self.settings, screens)
-        reasons += [*told, *left_out]
+        reasons += [*told, *left_out, *uncovered(self.terrain, pointing)]
         if self.settings.tracked_scans > 1:
             every, known, _ = point(scan, aircraft, steady, self.settings)
             fronts = fronts_of(scan, steady[known], every, self.terrain.grid, self.settings)

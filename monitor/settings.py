@@ -41,18 +41,21 @@ class MonitorSettings(BaseModel):
         1e-3, gt=0, lt=1, description="probability of a missed detection that the stated MDB stands for"
     )
     minimum_pairs: int | None = Field(
-        None, ge=2, description="pairs below which T is unavailable; 16 if not set, 20 for p_fa of 1e-4 and below"
+        None,
+        ge=2,
+        le=65_536,
+        description="pairs below which T is unavailable; 16 if not set, 20 for p_fa of 1e-4 and below",
     )
     beam_width_deg: float = Field(3.5, gt=0.1, le=30, description="one-way 3 dB width of the antenna beam")
     azimuth_fan: int = Field(7, ge=1, le=99, description="sub-azimuths across the beam; 1 is the paper's form")
     azimuth_span: float = Field(0.75, gt=0, le=2, description="how far the fan reaches each side, beam widths")
     refraction_k: float = Field(
-        4 / 3, gt=0, description="effective Earth radius factor; inf for the paper's flat Earth"
+        4 / 3, ge=0.5, description="effective Earth radius factor; inf for the paper's flat Earth"
     )
     range_reference: Literal["centre", "far_edge"] = Field("centre", description="where in its bin a range is taken")
-    radial_spacing_deg: float = Field(3.0, gt=0, le=30, description="one radial in every so many degrees enters T")
-    minimum_size: int = Field(3, ge=1, description="smallest shadow used, range bins")
-    maximum_size: int | None = Field(None, ge=1, description="largest shadow used, range bins")
+    radial_spacing_deg: float = Field(3.0, ge=0.01, le=30, description="one radial in every so many degrees enters T")
+    minimum_size: int = Field(3, ge=1, le=65_536, description="smallest shadow used, range bins")
+    maximum_size: int | None = Field(None, ge=1, le=65_536, description="largest shadow used, range bins")
     minimum_width_deg: float = Field(
         0.0, ge=0, le=180, description="a shadow counts if overlapping ones of neighbouring radials reach so far across"
     )
@@ -60,7 +63,7 @@ class MonitorSettings(BaseModel):
         "overlap", description="shadows pair by overlap, or first against first: the paper's calibration"
     )
     range_limit_nm: float | None = Field(
-        None, gt=0, description="ignore everything beyond; the range setting if not set"
+        None, gt=0, le=320, description="ignore everything beyond; the range setting if not set"
     )
     radio_altitude_limit_m: float | None = Field(
         None, gt=0, le=20_000, description="height over ground (label 164) above which nothing is compared; no limit"

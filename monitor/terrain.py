@@ -15,6 +15,7 @@ import numpy as np
 import rasterio
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
+from rasterio._err import CPLE_BaseError  # what GDAL says where rasterio has no error of its own for it
 from rasterio.crs import CRS
 from rasterio.enums import Resampling
 from rasterio.errors import RasterioError
@@ -93,6 +94,9 @@ def _read(path: Path) -> Grid:
             warp = {"crs": WGS84, "resampling": Resampling.bilinear, "nodata": math.nan, "dtype": "float32"}
             with WarpedVRT(source, **warp) as geographic:
                 return _grid(geographic)
+    except CPLE_BaseError as error:
+        nowhere = f"{path} has a coordinate reference system that is of no place on Earth"
+        raise TerrainError(f"{nowhere}: assign one with gdal_edit.py -a_srs") from error
     except PermissionError as error:
         raise TerrainError(f"terrain file {path} may not be read: give this user the right to read it") from error
     except (RasterioError, OSError) as error:
@@ -111,6 +115,8 @@ def _grid(source: rasterio.DatasetReader) -> Grid:
     t = source.transform
     if t.b or t.d or t.a <= 0 or t.e >= 0:
         raise TerrainError(f"{source.name} is not a north-up raster: warp it with gdalwarp")
+    if not (t.f <= 90 - t.e and t.f + t.e * source.height >= -90 + t.e and math.isfinite(t.c)):
+        raise TerrainError(f"{source.name} has posts at no latitude or longitude: mend it with gdal_edit.py -a_ullr")
     return Grid(height_m, t.f + t.e / 2, t.c + t.a / 2, -t.e, t.a)
 
 

@@ -105,8 +105,9 @@ def put(samples, row, time_ns, value, status):  # type: ignore[no-untyped-def] #
         end = 0
     if end == room:
         end = room // 2
-        times[row, :end], values[row, :end] = times[row, end:], values[row, end:]
-        statuses[row, :end] = statuses[row, end:]
+        for k in range(end):  # slices would take seconds to compile, for the words of their errors
+            times[row, k], values[row, k] = times[row, end + k], values[row, end + k]
+            statuses[row, k] = statuses[row, end + k]
     times[row, end], values[row, end], statuses[row, end] = time_ns, value, status
     ends[row] = end + 1
 

@@ -3,12 +3,14 @@
 from pathlib import Path
 
 import pytest
+import rasterio
+from rasterio.transform import Affine
 
 from gateway.channels import Channel429, Channel708
 from gateway.config import RackConfig, TomlFile, check_config, load_config, profile_of
 from gateway.errors import GatewayError
 from gateway.link import Link
-from gateway.metadata import describe, recorded_config
+from gateway.metadata import build_monitor, describe, recorded_config
 
 ADAPTER = '[[adapters]]\nname = "bridge"\nsource = "serial:/dev/x"\n'
 
@@ -87,6 +89,22 @@ def test_a_rack_file_that_is_no_text_is_named(tmp_path: Path) -> None:
     (tmp_path / "rack.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(GatewayError, match=r"rack.toml is not TOML"):
         load_config(tmp_path / "rack.toml")
+
+
+def test_terrain_and_calibration_that_cannot_be_used_are_named_before_anything_opens(tmp_path: Path) -> None:
+    adapters = [{"name": "a", "source": "serial:x"}]
+    (tmp_path / "radar.json").write_text("sigma = 2")
+    nowhere = tmp_path / "nowhere.tif"
+    with rasterio.open(
+        nowhere, "w", driver="GTiff", height=2, width=2, count=1, dtype="int16", transform=Affine.translation(7, 45)
+    ):
+        pass
+    for table, said in (
+        ({"calibration": tmp_path / "radar.json"}, r"calibration file .*radar\.json: the file: Invalid JSON"),
+        ({"terrain": [nowhere]}, r"nowhere\.tif has no coordinate reference system: assign one with gdal_edit"),
+    ):
+        with pytest.raises(GatewayError, match=said):
+            build_monitor(check_config({"adapters": adapters, **table}, "test"))
 
 
 def test_a_configuration_survives_the_recording_that_holds_it() -> None:

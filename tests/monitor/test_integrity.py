@@ -367,6 +367,32 @@ def test_radials_that_leave_the_terrain_are_counted(white_mountains: Terrain, ho
     assert f"{lost} radials leave the terrain or cross voids" in verdict.reasons
 
 
+def test_an_aircraft_outside_the_stored_terrain_is_named_with_what_the_files_cover(
+    white_mountains: Terrain, honest: Scan
+) -> None:
+    for place, said in (({"latitude_deg": 43.9}, "43.900 -71.719"), ({"longitude_deg": 71.71874}, "44.375 71.719")):
+        verdict, _ = judge(white_mountains, honest, flying(**place))
+        assert verdict.verdict == "unavailable"
+        assert "61 radials leave the terrain or cross voids" in verdict.reasons
+        assert (
+            f"the aircraft, at {said}, is outside the stored terrain, latitudes 44.000 to 45.000 "
+            "and longitudes -72.000 to -71.000: name the files of where it flies"
+        ) in verdict.reasons
+
+
+def test_a_gap_in_the_terrain_below_the_aircraft_is_named_and_a_gap_elsewhere_is_not(
+    white_mountains: Terrain, honest: Scan
+) -> None:
+    """Posts are 3 arc-seconds apart: the aircraft is 749.8 rows south and 337.5 columns east of the corner."""
+    gap = "the stored terrain has a gap below the aircraft, at 44.375 -71.719: name a file that fills it"
+    for row, said in ((749, True), (700, False)):
+        height_m = white_mountains.grid.height_m.copy()
+        height_m[row : row + 2, 337:339] = np.nan
+        verdict, _ = judge(Terrain(white_mountains.grid._replace(height_m=height_m), [], ""), honest)
+        assert (gap in verdict.reasons) == said
+        assert (verdict.verdict == "unavailable") == said
+
+
 def test_an_aircraft_below_the_stored_terrain_is_never_ok(white_mountains: Terrain, honest: Scan) -> None:
     grid = white_mountains.grid
     feet = Terrain(grid._replace(height_m=grid.height_m / np.float32(0.3048)), [], "")

@@ -1,5 +1,6 @@
 """The terrain store against rasterio, the standards' post positions and exact bilinear arithmetic."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -175,6 +176,23 @@ def test_a_torn_file_is_named(white_mountains_path: Path, tmp_path: Path) -> Non
 def test_a_raster_without_a_place_on_earth_is_named_with_the_mend(tmp_path: Path) -> None:
     path = write(tmp_path / "nowhere.tif", np.ones((3, 3), np.int16), north_up(7, 45, 1), crs=None)
     with pytest.raises(TerrainError, match=r"nowhere\.tif has no coordinate reference system.*gdal_edit"):
+        open_terrain(path)
+
+
+MOON = 'GEOGCS["Moon",DATUM["Moon",SPHEROID["Moon",1737400,0]],PRIMEM["Moon",0],UNIT["degree",0.0174532925199433]]'
+
+
+@pytest.mark.parametrize("crs", [MOON, 'LOCAL_CS["a building site",UNIT["metre",1]]'])
+def test_a_place_that_is_not_on_earth_is_named_with_the_mend(tmp_path: Path, crs: str) -> None:
+    path = write(tmp_path / "moon.tif", np.ones((3, 3), np.int16), north_up(7, 45, 1), crs=crs)
+    with pytest.raises(TerrainError, match=r"moon\.tif has a coordinate reference system that is of no place on Earth"):
+        open_terrain(path)
+
+
+@pytest.mark.parametrize("corner", [(7, 96), (7, -88), (math.nan, 45), (7, math.nan)])
+def test_posts_beyond_the_poles_or_nowhere_are_refused(tmp_path: Path, corner: tuple[float, float]) -> None:
+    path = write(tmp_path / "off.tif", np.ones((5, 5), np.int16), north_up(*corner, 1))
+    with pytest.raises(TerrainError, match=r"off\.tif has posts at no latitude or longitude: mend it with gdal_edit"):
         open_terrain(path)
 
 

@@ -1,0 +1,34 @@
+"""Why the stored terrain says nothing where the aircraft is: it flies outside the files, or over a gap in them."""
+
+import numpy as np
+
+from monitor.prediction import Pointing
+from monitor.terrain import Grid, Terrain
+
+
+def uncovered(terrain: Terrain, pointing: Pointing) -> list[str]:
+    """Reasons with their mend, for radials (n,) that start where the ground below is not known."""
+    lat, lon = pointing.latitude_deg, pointing.longitude_deg
+    unknown = np.isnan(terrain.elevation(lat, lon))
+    south, north, west, east = extent(terrain.grid)
+    outside = unknown & ((lat < south) | (lat > north) | (lon < west) | (lon > east))
+    reasons = []
+    if outside.any():
+        k = int(np.argmax(outside))
+        reasons.append(
+            f"the aircraft, at {lat[k]:.3f} {lon[k]:.3f}, is outside the stored terrain, latitudes {south:.3f} to "
+            f"{north:.3f} and longitudes {west:.3f} to {east:.3f}: name the files of where it flies"
+        )
+    if (unknown & ~outside).any():
+        k = int(np.argmax(unknown & ~outside))
+        reasons.append(
+            f"the stored terrain has a gap below the aircraft, at {lat[k]:.3f} {lon[k]:.3f}: name a file that fills it"
+        )
+    return reasons
+
+
+def extent(grid: Grid) -> tuple[float, float, float, float]:
+    """South, north, west and east of the outermost posts, degrees."""
+    rows, columns = grid.height_m.shape
+    south, east = grid.north_deg - (rows - 1) * grid.row_deg, grid.west_deg + (columns - 1) * grid.column_deg
+    return south, grid.north_deg, grid.west_deg, east
