@@ -175,6 +175,10 @@ class RackConfig(_Section):
     adapters: tuple[AdapterConfig, ...]
     recording: RecordingConfig | None = None
     terrain: tuple[Path, ...] = Field((), description="GeoTIFF, HGT or DTED files")
+    water: tuple[Path, ...] = Field(
+        (),
+        description="rasters, where every value but 0 is water, or GeoJSON polygons: over large water nothing counts",
+    )
     calibration: Path | None = Field(None, description="calibration file of the radar; stated defaults without")
     radar_profile: ProfileSource = Field("arinc708", description="ARINC 708 profile of radar channels that name none")
     monitor: MonitorSettings = MonitorSettings()
@@ -209,6 +213,7 @@ def load_config(path: Path) -> RackConfig:
     )
     changes = {
         "terrain": tuple(base / file for file in config.terrain),
+        "water": tuple(base / file for file in config.water),
         "calibration": config.calibration and base / config.calibration,
         "recording": recording,
     }

@@ -13,6 +13,7 @@ from gateway.errors import GatewayError
 from monitor.calibration import Calibration, load_calibration
 from monitor.integrity import Monitor
 from monitor.terrain import TerrainError, open_terrain
+from monitor.water import open_water
 
 
 def build_monitor(config: RackConfig, calibration: Calibration | None = None) -> Monitor | None:
@@ -20,9 +21,14 @@ def build_monitor(config: RackConfig, calibration: Calibration | None = None) ->
     try:
         if calibration is None and config.calibration:
             calibration = load_calibration(config.calibration)
+        if not config.terrain and config.water:
+            raise GatewayError("water without terrain masks nothing: name the terrain too, or leave the water out")
         if not config.terrain:
             return None
-        return Monitor(open_terrain(config.terrain), config.monitor, calibration)
+        terrain = open_terrain(config.terrain)
+        large_km2 = config.monitor.minimum_water_km2
+        water = open_water(config.water, terrain.grid, large_km2) if config.water else None
+        return Monitor(terrain, config.monitor, calibration, water)
     except (TerrainError, ValueError) as error:
         raise GatewayError(str(error)) from error
 
@@ -34,6 +40,7 @@ def describe(config: RackConfig, monitor: Monitor | None) -> dict[str, str]:
         "configuration": json.dumps(config.model_dump(mode="json")),
         "calibration": monitor.calibration.model_dump_json() if monitor and monitor.calibration else "",
         "terrain_checksum": monitor.terrain.checksum if monitor else "",
+        "water_checksum": monitor.water.checksum if monitor and monitor.water else "",
         "shadebus": version("shadebus"),
         "numpy": version("numpy"),
         "python": platform.python_version(),
@@ -74,4 +81,7 @@ def recorded_monitor(metadata: dict[str, str], config: RackConfig, terrain: tupl
     if monitor and not terrain and monitor.terrain.checksum != metadata["terrain_checksum"]:
         files = ", ".join(str(path) for path in config.terrain)
         raise GatewayError(f"{files} changed since the recording was made: name the terrain to use with --dem")
+    if monitor and monitor.water and monitor.water.checksum != metadata.get("water_checksum"):
+        files = ", ".join(str(path) for path in config.water)
+        raise GatewayError(f"water {files} changed since the recording was made: put back what it was made with")
     return monitor

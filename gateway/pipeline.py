@@ -55,7 +55,7 @@ class Pipeline:
         tells_state: bool = True,
     ) -> None:
         self._config = config
-        self._monitor = monitor
+        self._monitor: Monitor | None = before._monitor if before else monitor and monitor.anew()
         self._watcher = watcher
         self._tells_state = tells_state
         self._telling: Telling = before._telling if before else Telling()
@@ -159,6 +159,8 @@ class Pipeline:
         """All older state is worthless."""
         self._judge(self._scans.finish())
         self.aircraft = Aircraft(self._config.monitor.height_source)
+        if self._monitor:
+            self._monitor.forget()
         self._echo.forget()
         reason = f"the bridge's clock began anew at {time_ns / 1e9:.3f} s; the state before it is dropped"
         self._troubles[f"clock of {adapter}"] = f"degraded: {adapter}: {reason}"

@@ -1,6 +1,8 @@
 """Both threads of one scan side by side: what the radar saw, what the stored terrain predicts, and the pairs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +11,12 @@ from monitor.geodesy import NM_M
 from monitor.prediction import Beam, Pointing, predict
 from monitor.sample import ScanSample, Unmatched, signal_level
 from monitor.scans import Scan
+from monitor.screening import NO_SCREENS, Scene, Screens, screen
 from monitor.settings import MonitorSettings
-from monitor.shade import pair, radar_states, shadows, unmatched_share
+from monitor.shade import DEM_INITIAL, pair, pair_first, radar_states, shadows, unmatched_share
 from monitor.terrain import Terrain
+
+PAIRINGS: Final[dict[str, Callable[[Any, Any], NDArray[np.void]]]] = {"overlap": pair, "first": pair_first}
 
 
 @dataclass(frozen=True)
@@ -41,30 +46,44 @@ class Comparison:
 
 
 def compare(
-    scan: Scan, radials: NDArray[np.intp], pointing: Pointing, terrain: Terrain, settings: MonitorSettings
-) -> tuple[Comparison, int]:
-    """Compare on some radials of a scan, (n,) like the pointing; and how many of them leave the terrain."""
+    scan: Scan,
+    radials: NDArray[np.intp],
+    pointing: Pointing,
+    terrain: Terrain,
+    settings: MonitorSettings,
+    screens: Screens = NO_SCREENS,
+) -> tuple[Comparison, list[str]]:
+    """Compare on some radials of a scan, (n,) like the pointing; and what of it was left out, and why."""
     s, bins = settings, scan.bins.shape[1]
+    bin_width_m = scan.range_nm * NM_M / bins
     limit = bins if s.range_limit_nm is None else max(1, min(bins, int(bins * s.range_limit_nm / scan.range_nm)))
     beam = Beam(s.beam_width_deg, s.azimuth_fan, s.azimuth_span, s.refraction_k, s.range_reference)
-    dem, void = predict(terrain.grid, pointing, limit, scan.range_nm * NM_M / bins, beam)
+    dem, void = predict(terrain.grid, pointing, limit, bin_width_m, beam)
     dem, radials = dem[~void], radials[~void]
-    radar = radar_states(scan.bins[radials, :limit])
+    angles, echoes = scan.scan_angle_deg[radials], scan.bins[radials, :limit]
+    if screens.bins_left_out is not None:
+        near = np.arange(limit) < screens.bins_left_out[~void, None]
+        echoes[near], dem[near] = 0, DEM_INITIAL  # the radials begin there, but nearer ground still casts its shadow
+    radar = radar_states(echoes)
     seen = shadows(radar, "radar", s.minimum_size, s.maximum_size)
     predicted = shadows(dem, "dem", s.minimum_size, s.maximum_size)
+    scene = Scene(terrain.grid, angles, Pointing(*(column[~void] for column in pointing)), bin_width_m)
+    counts = screen(seen, predicted, scene, s, screens)
+    counted, expected = seen[counts.radar], predicted[counts.dem]
     # Range-limited shadows stay out before pairing: one of them must not take the place of a whole one.
-    whole, foreseen = seen[~seen["range_limited"]], predicted[~predicted["range_limited"]]
-    pairs = pair(whole, foreseen)
+    whole, foreseen = counted[~counted["range_limited"]], expected[~expected["range_limited"]]
+    pairs = PAIRINGS[s.pairing](whole, foreseen)
+    lost = [f"{np.count_nonzero(void)} radials leave the terrain or cross voids"] if void.any() else []
     return Comparison(
-        scan.scan_angle_deg[radials],
+        angles,
         radar,
         dem,
         pairs["radial"],
         whole["centre"][pairs["radar"]],
         foreseen["centre"][pairs["dem"]],
-        Unmatched(*unmatched_share(seen, predicted, dem)),
-        Unmatched(*unmatched_share(predicted, seen, radar)),
-    ), int(np.count_nonzero(void))
+        Unmatched(*unmatched_share(counted, predicted, dem)),
+        Unmatched(*unmatched_share(expected, seen, radar)),
+    ), [*lost, *counts.reasons]
 
 
 def thin(scan_angle_deg: NDArray[np.float64], spacing_deg: float) -> NDArray[np.intp]:

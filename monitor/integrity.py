@@ -1,9 +1,12 @@
 """One scan, the aircraft's state and the terrain to a verdict: does the stored terrain agree with the radar?"""
 
 import math
+from copy import copy
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from decoders.arinc708 import misread_bits
 from decoders.formats import MODES_708
@@ -13,32 +16,54 @@ from monitor.comparison import Comparison, compare, thin
 from monitor.coverage import uncovered
 from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, Test, examine
 from monitor.disparity import statistic, threshold
-from monitor.geodesy import LONGEST_RANGE_NM
+from monitor.geodesy import LONGEST_RANGE_NM, NM_M
 from monitor.hysteresis import Hysteresis
 from monitor.offset import Search
 from monitor.pointing import point
 from monitor.prediction import Pointing
+from monitor.quantities import RADIO_HEIGHT
+from monitor.radio_altitude import first_bins, too_high
 from monitor.sample import NOTHING, ScanSample
 from monitor.scans import Scan
+from monitor.screening import Screens
 from monitor.settings import MonitorSettings
 from monitor.terrain import Terrain
+from monitor.tracking import ShadowTracker, fronts_of
 from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
+from monitor.water import Water
 from monitor.window import Window
 
 MOST_UNMATCHED = 0.6  # share of shadows; without a calibration more of them forbid an ok
 
 
 class Monitor:
-    """Holds the terrain, the calibration and the settings, and judges scans."""
+    """Holds the terrain with its large water, the calibration and the settings, and judges scans."""
 
     def __init__(
-        self, terrain: Terrain, settings: MonitorSettings | None = None, calibration: Calibration | None = None
+        self,
+        terrain: Terrain,
+        settings: MonitorSettings | None = None,
+        calibration: Calibration | None = None,
+        water: Water | None = None,
     ) -> None:
         self.terrain = terrain
         self.settings = settings or MonitorSettings()
         self.calibration = calibration
-        self._window = Window(self.settings.window_scans)
+        self.water = water
         self._hysteresis = Hysteresis(self.settings.alert_scans, self.settings.clear_scans)
+        self.forget()
+
+    def anew(self) -> Self:
+        """The same monitor without a memory, for another recording: what it learns there stays there."""
+        other = copy(self)
+        other._hysteresis = Hysteresis(self.settings.alert_scans, self.settings.clear_scans)
+        other.forget()
+        return other
+
+    def forget(self) -> None:
+        """Forget the scans before, as after a clock that began anew; an alert goes on standing."""
+        self._window = Window(self.settings.window_scans)
+        self._tracker = ShadowTracker(self.settings.tracked_scans)
 
     def judge(self, scan: Scan, aircraft: Aircraft) -> tuple[Verdict, Comparison | None]:
         """The verdict on a scan; the comparison is None where the radar or the state did not allow one."""
@@ -51,14 +76,22 @@ class Monitor:
         reasons += _gaps(scan)
         if not usable.any():
             return self.unavailable(scan.number, reasons), None
-        comparison, lost = compare(scan, chosen[usable], pointing, self.terrain, self.settings)
-        if lost:
-            reasons.append(f"{lost} radials leave the terrain or cross voids")
-        reasons += uncovered(self.terrain, pointing)
+        chosen = chosen[usable]
+        limit_m = self.settings.radio_altitude_limit_m
+        height_m = aircraft.tracks[RADIO_HEIGHT.name].at(scan.time_ns[chosen]).value
+        if limit_m is not None and (high := too_high(height_m, limit_m)):
+            return self.unavailable(scan.number, [high, *reasons]), None
+        screens, told = self._screens(scan, pointing, height_m)
+        comparison, left_out = compare(scan, chosen, pointing, self.terrain, self.settings, screens)
+        reasons += [*told, *left_out, *uncovered(self.terrain, pointing)]
+        if self.settings.tracked_scans > 1:
+            every, known, _ = point(scan, aircraft, steady, self.settings)
+            fronts = fronts_of(scan, steady[known], every, self.terrain.grid, self.settings)
+            self._tracker.add(int(scan.time_ns[-1]), fronts)
         verdict = self._decide(scan, comparison, self._buried(pointing), reasons)
         if verdict.verdict == ALERT and self.settings.offset_search_m:
             calibration = self.calibration or uncalibrated(scan.bins.shape[1])
-            search = Search(scan, chosen[usable], pointing, self.terrain, self.settings, calibration)
+            search = Search(scan, chosen, pointing, self.terrain, self.settings, calibration, screens)
             found = search.most_likely()
             verdict = replace(
                 verdict,
@@ -80,6 +113,17 @@ class Monitor:
         if bits := misread_bits(scan.bins):
             return f"the range bins look like {bits} bits each: check radar_profile, or the channel's profile"
         return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm) if self.calibration else None
+
+    def _screens(
+        self, scan: Scan, pointing: Pointing, height_over_ground_m: NDArray[np.float64]
+    ) -> tuple[Screens, list[str]]:
+        """What decides which bins and shadows of a scan count, and what is to be said of it."""
+        s, before = self.settings, self._tracker.before(int(scan.time_ns[0]))
+        if not s.first_bin_from_radio_altitude:
+            return Screens(None, self.water, before), []
+        bin_width_m = scan.range_nm * NM_M / scan.bins.shape[1]
+        near, told = first_bins(height_over_ground_m, pointing.elevation_rad, s.beam_width_deg, bin_width_m)
+        return Screens(near, self.water, before), told
 
     def unavailable(self, scan: int, reasons: list[str]) -> Verdict:
         """The verdict that nothing can be said about a scan that could not be compared."""

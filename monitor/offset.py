@@ -15,6 +15,7 @@ from monitor.disparity import clipped
 from monitor.geodesy import displace
 from monitor.prediction import Pointing
 from monitor.scans import Scan
+from monitor.screening import NO_SCREENS, Screens
 from monitor.settings import MonitorSettings
 from monitor.terrain import Terrain
 
@@ -45,6 +46,7 @@ class Search:
     terrain: Terrain
     settings: MonitorSettings
     calibration: Calibration
+    screens: Screens = NO_SCREENS
 
     def most_likely(self) -> Offset:
         """The most likely error of all within `offset_search_m` to the north, south, east and west."""
@@ -67,8 +69,9 @@ class Search:
         p = self.pointing
         lat, lon, _ = displace(p.latitude_deg, p.longitude_deg, p.height_m, east_m * one, north_m * one, 0 * one)
         moved = p._replace(latitude_deg=lat, longitude_deg=lon)
-        settings = self.settings.model_copy(update={"azimuth_fan": fan})
-        comparison, _ = compare(self.scan, self.radials, moved, self.terrain, settings)
+        # Shadows are not tracked: seen from a place that is moved, no front stands where it stood.
+        settings = self.settings.model_copy(update={"azimuth_fan": fan, "tracked_scans": 1})
+        comparison, _ = compare(self.scan, self.radials, moved, self.terrain, settings, self.screens)
         c = self.calibration
         gained = c.clip_bins**2 - clipped(comparison.disparities, c.median_bins, c.clip_bins) ** 2
         return float(gained.sum() / (2 * c.variance_factor * c.sigma_bins**2))

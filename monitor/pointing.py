@@ -21,12 +21,13 @@ def point(
 ) -> tuple[Pointing, NDArray[np.bool_], list[str]]:
     """The pointing of those of the `chosen` radials (n,) whose state is known, which these are, and why not others."""
     times = scan.time_ns[chosen]
-    found = [aircraft.tracks[quantity.name].at(times) for quantity in NEEDED]
+    needed = (*NEEDED, state.RADIO_HEIGHT) if settings.uses_radio_altitude else NEEDED
+    found = [aircraft.tracks[quantity.name].at(times) for quantity in needed]
     status = np.array([values.status for values in found])
     usable = (status == 0).all(axis=0)
     reasons = [
         f"{quantity.name}: {status_name(int(row[row > 0][0]))} on {np.count_nonzero(row)} of {len(times)} radials"
-        for quantity, row in zip(NEEDED, status, strict=True)
+        for quantity, row in zip(needed, status, strict=True)
         if row.any()
     ]
     if settings.position_gate:
@@ -37,7 +38,7 @@ def point(
     if polar.any():
         usable &= ~polar
         reasons.append(f"{np.count_nonzero(polar)} radials start beyond {HIGHEST_LATITUDE_DEG:g} degrees of latitude")
-    lat, lon, height, pitch, roll, heading = (values.value[usable] for values in found)
+    lat, lon, height, pitch, roll, heading = (values.value[usable] for values in found[: len(NEEDED)])
     arm = settings.lever_arm
     ones = np.ones(len(lat))
     east, north, up = body_to_enu(arm.forward_m * ones, arm.right_m * ones, arm.down_m * ones, roll, pitch, heading)

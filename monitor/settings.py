@@ -56,8 +56,31 @@ class MonitorSettings(BaseModel):
     radial_spacing_deg: float = Field(3.0, ge=0.01, le=30, description="one radial in every so many degrees enters T")
     minimum_size: int = Field(3, ge=1, le=65_536, description="smallest shadow used, range bins")
     maximum_size: int | None = Field(None, ge=1, le=65_536, description="largest shadow used, range bins")
+    minimum_width_deg: float = Field(
+        0.0, ge=0, le=180, description="a shadow counts if overlapping ones of neighbouring radials reach so far across"
+    )
+    pairing: Literal["overlap", "first"] = Field(
+        "overlap", description="shadows pair by overlap, or first against first: the paper's calibration"
+    )
     range_limit_nm: float | None = Field(
         None, gt=0, le=320, description="ignore everything beyond; the range setting if not set"
+    )
+    radio_altitude_limit_m: float | None = Field(
+        None, gt=0, le=20_000, description="height over ground (label 164) above which nothing is compared; no limit"
+    )
+    first_bin_from_radio_altitude: bool = Field(
+        False, description="leave out the bins that lie nearer than the beam's lower edge meets flat ground"
+    )
+    minimum_water_km2: float = Field(
+        1.0, ge=0, le=1e9, description="the rack's water counts as water from this size on, square kilometres"
+    )
+    tracked_scans: int = Field(
+        1, ge=1, le=20, description="a radar shadow counts if so many scans in a row have its front; 1 tracks nothing"
+    )
+    # Three bins of 10 NM / 512, beyond which an edge is another one; half the way between radials half a degree apart,
+    # 81 m at 10 NM, lies within. It must stay below what the aircraft flies in a sweep: 180 m at 90 m/s and 2 s.
+    tracking_tolerance_m: float = Field(
+        110.0, gt=0, le=10_000, description="within which a front is at the same place on the ground in the next scan"
     )
     lever_arm: LeverArm = LeverArm()
     height_source: HeightSource = Field(
@@ -76,6 +99,11 @@ class MonitorSettings(BaseModel):
         if self.maximum_size is not None and self.maximum_size < self.minimum_size:
             raise ValueError(f"maximum_size {self.maximum_size} is below minimum_size {self.minimum_size}")
         return self
+
+    @property
+    def uses_radio_altitude(self) -> bool:
+        """Whether a radial needs the radio altimeter."""
+        return self.radio_altitude_limit_m is not None or self.first_bin_from_radio_altitude
 
     @property
     def pairs_needed(self) -> int:

@@ -130,7 +130,7 @@ def _shadows(states: NDArray[np.int8], min_size: int, max_size: int) -> NDArray[
 
 
 @njit(cache=True)
-def _end(s: Any) -> Any:
+def last_dark(s: Any) -> Any:
     """The last dark bin of a shadow."""
     return s.back if s.range_limited else s.back - 1
 
@@ -157,8 +157,8 @@ def pair(radar_shadows: Any, dem_shadows: Any) -> NDArray[np.void]:
             while m < dem_shadows.size and dem_shadows[m].radial == radial:
                 d = dem_shadows[m]
                 if r.range_limited == d.range_limited:
-                    overlap = min(_end(r), _end(d)) - max(r.front, d.front)
-                    rank = (overlap, _end(r) - r.front + _end(d) - d.front, -min(r.front, d.front))
+                    overlap = min(last_dark(r), last_dark(d)) - max(r.front, d.front)
+                    rank = (overlap, last_dark(r) - r.front + last_dark(d) - d.front, -min(r.front, d.front))
                     if overlap > 0 and (pick[0] < 0 or rank > best):
                         best, pick = rank, (k, m)
                 m += 1
@@ -169,6 +169,19 @@ def pair(radar_shadows: Any, dem_shadows: Any) -> NDArray[np.void]:
     for k in range(len(found)):
         p = out[k]
         p.radial, p.radar, p.dem, p.overlap = found[k]
+    return out
+
+
+def pair_first(radar_shadows: NDArray[np.void], dem_shadows: NDArray[np.void]) -> NDArray[np.void]:
+    """The first shadow on each radial against the first, overlapping or not: as in the calibration of section 3.
+
+    Inputs and result as those of `pair`; `overlap` is 0 for two that lie apart.
+    """
+    radial, r, d = np.intersect1d(radar_shadows["radial"], dem_shadows["radial"], return_indices=True)
+    ends = [found["back"] - ~found["range_limited"] for found in (radar_shadows[r], dem_shadows[d])]
+    overlap = np.minimum(*ends) - np.maximum(radar_shadows["front"][r], dem_shadows["front"][d])
+    out = np.empty(len(radial), PAIR)
+    out["radial"], out["radar"], out["dem"], out["overlap"] = radial, r, d, np.maximum(overlap, 0)
     return out
 
 
@@ -191,7 +204,7 @@ def unmatched_share(
     """
     unmatched = eligible = start = 0
     for s in mine:
-        end = _end(s)
+        end = last_dark(s)
         if s.range_limited or not _any_lit(other_states[s.radial, : s.front]):
             continue
         while start < others.size and others[start].radial < s.radial:
@@ -200,8 +213,8 @@ def unmatched_share(
         m = start
         while m < others.size and others[m].radial == s.radial:
             o = others[m]
-            overlap = min(end, _end(o)) - max(s.front, o.front)
-            matched |= overlap >= min_overlap * (max(end, _end(o)) - min(s.front, o.front))
+            overlap = min(end, last_dark(o)) - max(s.front, o.front)
+            matched |= overlap >= min_overlap * (max(end, last_dark(o)) - min(s.front, o.front))
             hidden |= o.range_limited and end > o.front
             m += 1
         eligible += not hidden

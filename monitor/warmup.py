@@ -7,6 +7,7 @@ from decoders.formats import MODES_708, WORD_708_BYTES
 from monitor.aircraft import Aircraft
 from monitor.integrity import Monitor
 from monitor.pointing import NEEDED
+from monitor.quantities import RADIO_HEIGHT
 from monitor.scans import ScanBuilder
 
 SECOND_NS = 1_000_000_000
@@ -22,7 +23,7 @@ def warm_up(monitor: Monitor) -> None:
         "height_m": float(np.nanmax(grid.height_m)),
     }
     times = np.array([0, SECOND_NS // 10])
-    for quantity in NEEDED:
+    for quantity in (*NEEDED, RADIO_HEIGHT):
         values = np.full(2, middle.get(quantity.name, 0.0))
         aircraft.tracks[quantity.name].append(times, values, np.zeros(2, np.uint8))
     angles = np.tile(np.arange(-9.0, 10.0, 3.0), 4)  # the ends of the third sweep are compared with the second's
@@ -37,4 +38,4 @@ def warm_up(monitor: Monitor) -> None:
     builder = ScanBuilder()
     scans = [*builder.feed(np.full(n, SECOND_NS // 20), radials), *builder.finish()]
     settings = monitor.settings.model_copy(update={"minimum_pairs": 2, "position_gate": False})
-    Monitor(monitor.terrain, settings).judge(scans[-1], aircraft)
+    Monitor(monitor.terrain, settings, water=monitor.water).judge(scans[-1], aircraft)

@@ -5,6 +5,9 @@ from typing import Annotated
 
 import typer
 
+SHOWN_KEYS = (
+    "terrain_checksum", "water_checksum", "shadebus", "numpy", "python", "host", "clock", "cut", "merged", "recovered",
+)  # fmt: skip # of the metadata
 SHOWN_PLACES = 10  # of the damaged ones; `verify` prints more
 
 
@@ -54,7 +57,8 @@ def info(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
     for adapter in config.adapters:
         table.add_row("adapter", f"{adapter.name}: {adapter.source}")
     table.add_row("terrain", ", ".join(str(path) for path in config.terrain) or "none")
-    for key in ("terrain_checksum", "shadebus", "numpy", "python", "host", "clock", "cut", "merged", "recovered"):
+    table.add_row("water", ", ".join(str(path) for path in config.water) or "none")
+    for key in SHOWN_KEYS:
         if key in source.metadata:
             table.add_row(key, source.metadata[key])
     for event in pipeline.finish():

@@ -110,8 +110,13 @@ def _adapters(sources: list[_Source]) -> tuple[dict[str, AdapterConfig], list[st
 def _metadata(sources: list[_Source], adapters: dict[str, AdapterConfig], told: list[str]) -> dict[str, str]:
     """The metadata of the first, with what others alone have, and the configuration of all."""
     terrain = _only(sources, "terrain", lambda s: s.recording.metadata.get("terrain_checksum", ""), "")
+    water = _only(sources, "water", lambda s: s.recording.metadata.get("water_checksum", ""), "")
     calibration = _only(sources, "calibration", lambda s: s.recording.metadata.get("calibration", ""), "")
-    changes: dict[str, object] = {"terrain": terrain.config.terrain, "calibration": calibration.config.calibration}
+    changes: dict[str, object] = {
+        "terrain": terrain.config.terrain,
+        "water": water.config.water,
+        "calibration": calibration.config.calibration,
+    }
     for key in ("radar_profile", "monitor"):
         default = RackConfig.model_fields[key].default
         changes[key] = getattr(_only(sources, key, _reading(key), default).config, key)
@@ -120,6 +125,7 @@ def _metadata(sources: list[_Source], adapters: dict[str, AdapterConfig], told: 
         **{key: text for key, text in sources[0].recording.metadata.items() if key not in OF_ONE_FILE},
         "configuration": json.dumps(config.model_dump(mode="json")),
         "terrain_checksum": terrain.recording.metadata.get("terrain_checksum", ""),
+        "water_checksum": water.recording.metadata.get("water_checksum", ""),
         "calibration": calibration.recording.metadata.get("calibration", ""),
         "host": ", ".join(dict.fromkeys(s.recording.metadata.get("host", "") for s in sources)),
         "merged": "; ".join([", ".join(s.name for s in sources), *told]),

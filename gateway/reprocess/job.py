@@ -22,7 +22,12 @@ from gateway.recording.session import sessions
 from monitor.integrity import Monitor
 
 RECORDS_AT_ONCE = 1024
-MADE_WITH = ("configuration", "calibration", "terrain_checksum")  # of the metadata, what decides how it is judged
+MADE_WITH = (
+    "configuration",
+    "calibration",
+    "terrain_checksum",
+    "water_checksum",
+)  # of the metadata, what decides how it is judged
 SET_UPS = 4  # kept: each has its terrain in memory
 CODE = ("decoders", "monitor", "gateway")  # whose sources decide what comes out
 OF_THE_SCAN = ("radials", pa.int64()), ("range_nm", pa.float64()), ("tilt_deg", pa.float64())
@@ -49,7 +54,7 @@ class Outcome(NamedTuple):
 
 
 def key(job: Job) -> str:
-    """A digest of all that the outcome depends on: recording, configuration, calibration, terrain and code.
+    """A digest of all that the outcome depends on: recording, configuration, calibration, terrain, water and code.
 
     A file counts as the same while its size and time of change are. Raises GatewayError as `work` does.
     """
@@ -61,7 +66,8 @@ def _key(recording: Recording, config: RackConfig, monitor: Monitor | None) -> s
     files = [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in recording.files]
     calibration = monitor.calibration.model_dump_json() if monitor and monitor.calibration else ""
     terrain = monitor.terrain.checksum if monitor else ""
-    said = [files, config.model_dump_json(), calibration, terrain, code_version()]
+    water = monitor.water.checksum if monitor and monitor.water else ""
+    said = [files, config.model_dump_json(), calibration, terrain, water, code_version()]
     return hashlib.sha256(json.dumps(said).encode()).hexdigest()
 
 
@@ -113,7 +119,8 @@ def set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
             f"{job.path} was recorded from {', '.join(sorted(names))}, and the rack file names none of them: "
             f"give one of its adapters ({', '.join(sorted(given))}) that name"
         )
-    files = [(path, path.stat().st_mtime_ns) for path in job.terrain or config.terrain if path.exists()]
+    maps = (*(job.terrain or config.terrain), *config.water)
+    files = [(path, path.stat().st_mtime_ns) for path in maps if path.exists()]
     made_with = tuple((name, recording.metadata[name]) for name in MADE_WITH if name in recording.metadata)
     return _made(job.config, job.terrain, made_with, tuple(files))
 
@@ -122,7 +129,7 @@ def set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
 def _made(
     config: str, terrain: tuple[Path, ...], metadata: tuple[tuple[str, str], ...], _: tuple[tuple[Path, int], ...]
 ) -> tuple[RackConfig, Monitor | None]:
-    """The same for all recordings that were made alike, as long as the terrain files are the same."""
+    """The same for all recordings that were made alike, as long as the files of terrain and water are the same."""
     if not config:
         recorded = recorded_config(dict(metadata))
         return recorded, recorded_monitor(dict(metadata), recorded, terrain)

@@ -28,9 +28,11 @@ def test_a_small_rack_file_is_enough(tmp_path: Path) -> None:
 
 
 def test_paths_count_from_where_the_rack_file_lies(tmp_path: Path) -> None:
-    text = f'terrain = ["a.hgt", "/b.hgt"]\ncalibration = "c.json"\n{ADAPTER}[recording]\ndirectory = "d"\n'
+    maps = 'terrain = ["a.hgt", "/b.hgt"]\nwater = ["w.tif", "/w.geojson"]\n'
+    text = f'{maps}calibration = "c.json"\n{ADAPTER}[recording]\ndirectory = "d"\n'
     config = load(tmp_path, text)
     assert config.terrain == (tmp_path / "a.hgt", Path("/b.hgt"))
+    assert config.water == (tmp_path / "w.tif", Path("/w.geojson"))
     assert config.calibration == tmp_path / "c.json"
     assert config.recording is not None
     assert config.recording.directory == tmp_path / "d"

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from monitor.shade import dem_states, pair, radar_states, shadows, unmatched_share
+from monitor.shade import dem_states, pair, pair_first, radar_states, shadows, unmatched_share
 
 Dark = tuple[int, int, int, bool]  # radial, first dark bin, last dark bin, range-limited
 BINS = 24
@@ -20,6 +20,10 @@ TWO_THREADS = st.integers(1, 4).flatmap(
 
 def states(lit: list[list[bool]]) -> NDArray[np.int8]:
     return radar_states(np.array(lit, np.uint8))
+
+
+def levels(drawn: str) -> NDArray[np.uint8]:
+    return np.array([*drawn], np.uint8)
 
 
 def radar_oracle(levels: list[int]) -> list[int]:
@@ -251,3 +255,16 @@ def test_shadows_before_the_first_echo_or_in_the_unseen_tail_of_the_other_thread
     assert share(mine, [[False, False, True, True, True, True, True]]) == (2, 2)
     assert share(mine, [[False, False, True, True, True, False, False]]) == (1, 1)
     assert share(mine, [[False] * 7]) == (0, 0)
+
+
+def test_first_against_first_pairs_what_lies_apart_and_passes_over_a_larger_overlap() -> None:
+    """Radial 0: first ones apart, later ones alike. Radial 1: no radar shadow. Radial 2: they share bins 4 and 5."""
+    radar = shadows(radar_states(np.array([*map(levels, ("1011110001", "1111111111", "1100011011"))])), "radar")
+    dem = shadows(radar_states(np.array([*map(levels, ("1110110001", "1011111111", "1110001101"))])), "dem")
+    assert pair_first(radar, dem).tolist() == [(0, 0, 0, 0), (2, 2, 3, 2)]
+    assert pair(radar, dem).tolist() == [(0, 1, 1, 3), (2, 2, 3, 2)]
+
+
+def test_first_against_first_of_no_shadows_is_no_pair() -> None:
+    none = shadows(states([[True] * 4]), "radar")
+    assert not pair_first(none, none).size

@@ -1,0 +1,185 @@
+"""Large water: still water returns as little as a shadow does, so that dark bins over it are no evidence of terrain.
+
+Young, Uijt de Haag and Campbell (2004), section 4 (d). The water is drawn on the posts of the terrain, from rasters in
+which every value but 0 is water and from GeoJSON polygons.
+"""
+
+import json
+import math
+import zlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rasterio
+from numba import njit
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+from rasterio.enums import Resampling
+from rasterio.errors import CRSError, RasterioError
+from rasterio.features import bounds, rasterize
+from rasterio.transform import Affine
+from rasterio.vrt import WarpedVRT
+from rasterio.warp import transform_bounds, transform_geom
+
+from monitor.geodesy import curvature_radii
+from monitor.places import line, place
+from monitor.prediction import Pointing
+from monitor.shade import last_dark
+from monitor.terrain import WGS84, Grid
+
+POLYGONS = (".geojson", ".json")
+AROUND = np.ones((3, 3), np.uint8)  # posts that touch at a corner are of one water
+
+
+class WaterError(ValueError):
+    """A water file that is missing, unreadable, without a place on Earth or polygons, or away from the terrain."""
+
+
+class Water:
+    """Large water on the posts of a terrain. Made by `open_water`."""
+
+    def __init__(self, grid: Grid, wet: NDArray[np.bool_], paths: Sequence[Path], checksum: str) -> None:
+        self.grid = grid
+        self.wet = wet
+        self.paths = tuple(paths)
+        self.checksum = checksum
+
+    def below(self, found: NDArray[np.void], pointing: Pointing, bin_width_m: float) -> NDArray[np.bool_]:
+        """Which shadows (k,) on radials (n,) have a dark bin whose centre lies over water, on the boresight."""
+        return np.asarray(_below(self.grid, self.wet, pointing, bin_width_m, found))
+
+
+def open_water(path_or_paths: Path | Sequence[Path], grid: Grid, minimum_km2: float) -> Water:
+    """Draw the water of some files on a terrain's posts, and leave out what is smaller than `minimum_km2` there.
+
+    Raises WaterError, naming the file and the mend, for a file that is missing or cannot be read, has no coordinate
+    reference system or no polygons, or lies outside the terrain.
+    """
+    paths = [path_or_paths] if isinstance(path_or_paths, Path) else list(path_or_paths)
+    wet = np.zeros(grid.height_m.shape, bool)
+    checksum = 0
+    for path in paths:
+        try:
+            content = path.read_bytes()
+            wet |= (_polygons if path.suffix.lower() in POLYGONS else _raster)(path, grid)
+        except (RasterioError, OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+            raise WaterError(f"water file {path} cannot be read as a raster or GeoJSON: {error}") from error
+        checksum = zlib.crc32(content, checksum)
+    return Water(grid, _large(wet, grid, minimum_km2), paths, f"{checksum:08x}")
+
+
+def _raster(path: Path, grid: Grid) -> NDArray[np.bool_]:
+    rows, columns = grid.height_m.shape
+    with rasterio.open(path) as source:
+        if source.crs is None:
+            raise WaterError(
+                f"water file {path} has no coordinate reference system: assign one with gdal_edit.py -a_srs"
+            )
+        if source.count != 1:
+            raise WaterError(
+                f"water file {path} has {source.count} bands: one is needed, with 0 where there is no water"
+            )
+        _meets(path, transform_bounds(source.crs, WGS84, *source.bounds), grid)
+        warp = {"crs": WGS84, "transform": _transform(grid), "width": columns, "height": rows}
+        with WarpedVRT(source, **warp, resampling=Resampling.nearest) as posts:
+            return np.asarray(np.nan_to_num(posts.read(1, masked=True).filled(0)) != 0)
+
+
+def _polygons(path: Path, grid: Grid) -> NDArray[np.bool_]:
+    document = json.loads(path.read_text("utf-8"))
+    crs = _crs(path, document)
+    found = [*_areas(document)]
+    if not found:
+        raise WaterError(f"water file {path} holds no polygons: draw the water as Polygon or MultiPolygon")
+    if not all(_is_whole(shape) for shape in found):
+        raise WaterError(f"water file {path} holds a polygon without closed rings of numbers: mend or remove it")
+    shapes = [shape if crs == WGS84 else transform_geom(crs, WGS84, shape) for shape in found]
+    west, south, east, north = zip(*(bounds(shape) for shape in shapes), strict=True)
+    _meets(path, (min(west), min(south), max(east), max(north)), grid)
+    return np.asarray(rasterize(shapes, grid.height_m.shape, transform=_transform(grid), dtype="uint8") > 0)
+
+
+def _crs(path: Path, document: Any) -> CRS:
+    """WGS 84 as of RFC 7946, unless the member of GeoJSON 2008 names another."""
+    member = document.get("crs") if isinstance(document, dict) else None
+    if member is None:
+        return WGS84
+    try:
+        return CRS.from_user_input(member["properties"]["name"])
+    except (CRSError, KeyError, TypeError) as error:
+        raise WaterError(f"water file {path} names no coordinate reference system that is known in its crs") from error
+
+
+def _areas(item: Any) -> Iterator[dict[str, Any]]:
+    """The polygons in a GeoJSON object, however it is built."""
+    if not isinstance(item, dict):
+        return
+    if item.get("type") in ("Polygon", "MultiPolygon"):
+        yield item
+    yield from _areas(item.get("geometry"))
+    for parts in (item.get("geometries"), item.get("features")):
+        for part in parts if isinstance(parts, list) else ():
+            yield from _areas(part)
+
+
+def _is_whole(shape: dict[str, Any]) -> bool:
+    """Whether every ring is four positions of finite numbers or more: GDAL takes the rest on trust, and may crash."""
+    try:
+        parts = shape["coordinates"] if shape["type"] == "MultiPolygon" else [shape["coordinates"]]
+        polygons = [[np.asarray(ring) for ring in part] for part in parts]
+    except (KeyError, TypeError, ValueError):
+        return False
+    rings = [ring for polygon in polygons for ring in polygon]
+    numbers = (
+        ring.dtype.kind in "if" and ring.ndim == 2 and ring.shape[0] >= 4 and ring.shape[1] >= 2 for ring in rings
+    )
+    return all(polygons) and bool(rings) and all(numbers) and all(np.isfinite(ring).all() for ring in rings)
+
+
+def _transform(grid: Grid) -> Affine:
+    """Of a raster whose pixel centres are the posts."""
+    west_deg, north_deg = grid.west_deg - grid.column_deg / 2, grid.north_deg + grid.row_deg / 2
+    return Affine(grid.column_deg, 0, west_deg, 0, -grid.row_deg, north_deg)
+
+
+def _meets(path: Path, box: tuple[float, float, float, float], grid: Grid) -> None:
+    west, south, east, north = box
+    rows, columns = grid.height_m.shape
+    south_deg, east_deg = grid.north_deg - (rows - 1) * grid.row_deg, grid.west_deg + (columns - 1) * grid.column_deg
+    if not (west <= east_deg and east >= grid.west_deg and south <= grid.north_deg and north >= south_deg):
+        raise WaterError(
+            f"water file {path} lies outside the terrain: it reaches from {south:.3f} to {north:.3f} N and "
+            f"{west:.3f} to {east:.3f} E; name only those that the flight needs, or mend its reference system"
+        )
+
+
+def _large(wet: NDArray[np.bool_], grid: Grid, minimum_km2: float) -> NDArray[np.bool_]:
+    """The water of connected posts that together stand for at least so much ground."""
+    from scipy.ndimage import label  # noqa: PLC0415 # only where there is water, as it takes its time
+
+    numbers, _ = label(wet, AROUND)
+    latitudes = np.radians(grid.north_deg - np.arange(len(wet)) * grid.row_deg)
+    radii = np.array([curvature_radii(latitude) for latitude in latitudes])
+    post_km2 = radii.prod(axis=1) * np.cos(latitudes) * math.radians(grid.row_deg) * math.radians(grid.column_deg) / 1e6
+    rows, columns = np.nonzero(numbers)
+    area_km2 = np.bincount(numbers[rows, columns], weights=post_km2[rows])
+    return np.asarray((area_km2 >= minimum_km2)[numbers] & wet) if rows.size else wet
+
+
+@njit(cache=True)
+def _below(grid, wet, pointing, bin_width_m, found):  # type: ignore[no-untyped-def] # typed by Water.below
+    over = np.zeros(found.size, np.bool_)
+    for k in range(found.size):
+        shadow = found[k]
+        track, ground = line(grid, pointing, shadow.radial)
+        height = pointing.height_m[shadow.radial]
+        for j in range(shadow.front, last_dark(shadow)):  # bins front + 1 to the last dark one
+            latitude, longitude, ground = place(grid, track, height, ground, (j + 0.5) * bin_width_m)
+            row = round((grid.north_deg - latitude) / grid.row_deg)
+            column = round((longitude - grid.west_deg) / grid.column_deg)
+            if 0 <= row < wet.shape[0] and 0 <= column < wet.shape[1] and wet[row, column]:
+                over[k] = True
+                break
+    return over
