@@ -388,14 +388,14 @@ def test_a_gap_in_the_terrain_below_the_aircraft_is_named_and_a_gap_elsewhere_is
     for row, said in ((749, True), (700, False)):
         height_m = white_mountains.grid.height_m.copy()
         height_m[row : row + 2, 337:339] = np.nan
-        verdict, _ = judge(Terrain(white_mountains.grid._replace(height_m=height_m), [], ""), honest)
+        verdict, _ = judge(Terrain(white_mountains.grid.with_heights(height_m), [], ""), honest)
         assert (gap in verdict.reasons) == said
         assert (verdict.verdict == "unavailable") == said
 
 
 def test_an_aircraft_below_the_stored_terrain_is_never_ok(white_mountains: Terrain, honest: Scan) -> None:
     grid = white_mountains.grid
-    feet = Terrain(grid._replace(height_m=grid.height_m / np.float32(0.3048)), [], "")
+    feet = Terrain(grid.with_heights(grid.height_m / np.float32(0.3048)), [], "")
     verdict, _ = judge(feet, honest, settings=MonitorSettings(minimum_pairs=2, p_fa=0.1))
     assert verdict.verdict != "ok"
     assert any("below the stored terrain" in reason for reason in verdict.reasons)
