@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test rig-test lint bench integrity sensitivity latency load full-load hours soak crash rebaseline calibration dbc setup lock clean
+.PHONY: demo test rig-test lint bench evidence integrity sensitivity latency load full-load hours soak crash rebaseline calibration dbc setup lock clean
 
 demo: $(READY)
 	$(BIN)/shadebus demo
@@ -24,6 +24,10 @@ lint: $(READY)
 
 bench: $(READY)
 	$(BIN)/pytest benchmarks --benchmark-enable --benchmark-only
+
+# What the monitor's numbers are worth, into docs/evidence.md; half an hour on two cores.
+evidence: $(READY)
+	$(BIN)/python -m benchmarks.evidence
 
 # Rates of false and true alerts on flights that nothing was tuned on; a few minutes on two cores.
 integrity: $(READY)

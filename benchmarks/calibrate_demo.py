@@ -6,7 +6,7 @@ of the scans is fitted, the other half checks the fit, and the checked rates go 
 
 from benchmarks.flights import Flight, fly_all
 from gateway.demo import CALIBRATION
-from monitor.calibration import fit
+from monitor.fitting import fit
 from simulators.campaign import draw_legs
 from simulators.scenario import white_mountains
 
@@ -20,7 +20,7 @@ def main() -> None:
     """Fly, fit, check, write."""
     base = white_mountains(seed=SEED)
     flights = [Flight(leg, base.world.path, P_FAS[0]) for leg in draw_legs(base, LEGS, SEED)]
-    scans = [scan.disparities for flight in fly_all(flights) for scan in flight]
+    scans = [scan.sample for flight in fly_all(flights) for scan in flight]
     half = len(scans) // 2
     made = fit(
         scans[:half],

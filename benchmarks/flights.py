@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gateway.config import check_config
 from gateway.metadata import build_monitor
 from gateway.pipeline import Pipeline
 from gateway.records import Raw, Stamp
 from monitor.calibration import Calibration
 from monitor.comparison import Comparison
+from monitor.sample import NOTHING, ScanSample
 from monitor.scans import Scan
 from monitor.verdict import ALERT, Verdict
 from simulators.carriers import stream
@@ -38,10 +36,10 @@ class Flight:
 
 @dataclass(frozen=True)
 class Judged:
-    """One scan of a flight: its verdict, and the disparities behind it (n,), range bins."""
+    """One scan of a flight: its verdict, and what the tests looked at."""
 
     verdict: Verdict
-    disparities: NDArray[np.float64]
+    sample: ScanSample
 
 
 def fly(flight: Flight) -> list[Judged]:
@@ -55,8 +53,8 @@ def fly(flight: Flight) -> list[Judged]:
     config = check_config(rack, "flight")
     judged: list[Judged] = []
 
-    def watch(_: Scan, verdict: Verdict, comparison: Comparison | None) -> None:
-        judged.append(Judged(verdict, comparison.disparities if comparison else np.empty(0)))
+    def watch(scan: Scan, verdict: Verdict, comparison: Comparison | None) -> None:
+        judged.append(Judged(verdict, comparison.sample(scan) if comparison else NOTHING))
 
     pipeline = Pipeline(config, build_monitor(config, flight.calibration), watch)
     for number, (time_ns, data) in enumerate(units(flight.scenario, stream())):

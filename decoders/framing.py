@@ -1,6 +1,7 @@
 """What every framer promises: recorded chunks of one adapter in, packets out, and no byte unaccounted for."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
@@ -77,9 +78,10 @@ class PacketFramer:
         """Packets completed by the next chunk."""
         raise NotImplementedError
 
-    def frame(self, chunks: Sequence[bytes]) -> Packets:
-        """Packets completed by the next chunks, many at once."""
-        fed = [(packet, k) for k, chunk in enumerate(chunks) for packet in self.feed(chunk)]
+    def frame(self, data: npt.NDArray[np.uint8], ends: npt.NDArray[np.int64]) -> Packets:
+        """Packets completed by the next chunks, many at once: these lie one behind the other and end at `ends`."""
+        bounds = pairwise((0, *ends.tolist()))
+        fed = [(packet, k) for k, (a, b) in enumerate(bounds) for packet in self.feed(data[a:b].tobytes())]
         return columns([packet for packet, _ in fed], [k for _, k in fed])
 
     def counters(self) -> dict[str, int]:

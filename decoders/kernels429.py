@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from decoders import formats as f
 from decoders.definition_rows import CHARACTER_BITS
 from decoders.formats import CLOCK_DIGITS, DATE_DIGITS, SSM_BCD_MINUS, TIME_FIELDS
 from decoders.results429 import Status
@@ -36,8 +35,6 @@ SSM_STATUS: Final = 6  # and three more: the status that SSM 00, 01, 10 and 11 g
 COLUMNS: Final = 10
 
 INVALID: Final = -(2**62)  # no field of a word is that small
-ENTRY_BYTES: Final = f.ENTRY_429_BYTES  # of a packet
-MOST_WORDS: Final = f.LINK_MAX_WORDS
 NORMAL: Final = int(Status.NORMAL)
 BAD_PARITY: Final = int(Status.BAD_PARITY)
 UNKNOWN_LABEL: Final = int(Status.UNKNOWN_LABEL)
@@ -250,42 +247,3 @@ def _characters(raw: Int) -> Int:
             return INVALID
         rest >>= CHARACTER_BITS
     return raw
-
-
-@njit(cache=True)
-def entries(  # type: ignore[no-untyped-def] # typed by racklink.joined429
-    times_ns, offsets_ns, sizes, bodies, time_ns, sent_ns, words
-):
-    """Read the entries of packets: their words, when they were sent, and the same by the common clock.
-
-    Gives how many words there are, how many packets are malformed, and how many words of those are left out.
-    """
-    count = malformed = left_out = begin = 0
-    for packet in range(sizes.size):
-        size = int(sizes[packet])
-        whole, first, before, backwards = size // ENTRY_BYTES, count, 0, 0
-        for k in range(whole):
-            at = begin + ENTRY_BYTES * k
-            after = int(_little(bodies, at))
-            backwards += after < before
-            before = after
-            time_ns[count] = times_ns[packet] + after
-            sent_ns[count] = time_ns[count] + offsets_ns[packet]
-            words[count] = _little(bodies, at + 4)
-            count += 1
-        if backwards:
-            left_out += whole
-            count = first
-        if backwards or whole * ENTRY_BYTES != size or not 1 <= whole <= MOST_WORDS:
-            malformed += 1
-        begin += size
-    return count, malformed, left_out
-
-
-@njit(cache=True)
-def _little(data: npt.NDArray[np.uint8], at: Int) -> Int:
-    """Four bytes, the least significant first."""
-    value = np.int64(0)
-    for k in range(4):
-        value |= np.int64(data[at + k]) << (8 * k)
-    return value

@@ -19,6 +19,8 @@ LONGEST: Final = f.LINK_MAX_BYTES
 LONGEST_ENCODED: Final = f.LINK_MAX_ENCODED_BYTES
 VERSION: Final = f.LINK_VERSION
 CRC_RESIDUE: Final = zlib.crc32(bytes(f.LINK_CRC_BYTES))  # of all bytes that end with their CRC; that of none is 0
+ENTRY_BYTES: Final = f.ENTRY_429_BYTES
+MOST_WORDS: Final = f.LINK_MAX_WORDS
 FULL_GROUP: Final = 255  # a COBS code after which no zero is left out
 LOWS: Final = 0x0101010101010101  # of each byte of a word, the lowest bit
 HIGHS: Final = 0x8080808080808080
@@ -63,6 +65,29 @@ def described(decoded: Bytes, found: Array, ends: Array, header: Array, chunk: A
         chunk[i] = k
         start = np.uint64(found[i, 0])
         header[i, 0], header[i, 1] = word(decoded, start), word(decoded, start + np.uint64(8))
+
+
+@njit(cache=True)
+def entries(  # type: ignore[no-untyped-def] # typed by racklink.joined429
+    data, start, size, device_ns, offset_ns, time_ns, sent_ns, words, count
+):
+    """Read the entries of an ARINC 429 packet, the body of which is data[start : start + size].
+
+    Behind the first `count` of their arrays they put when words were sent, the same by the common clock, and the words.
+    Gives how many words there are then, whether the packet is malformed, and how many words of it are left out.
+    """
+    whole, before, backwards = np.int64(size) // ENTRY_BYTES, np.uint64(0), False
+    for k in range(whole):
+        entry = word(data, np.uint64(start + ENTRY_BYTES * k))
+        after = entry & np.uint64(0xFFFFFFFF)
+        backwards |= after < before
+        before = after
+        time_ns[count + k] = device_ns + np.int64(after)
+        sent_ns[count + k] = time_ns[count + k] + offset_ns
+        words[count + k] = entry >> np.uint64(32)
+    if backwards:
+        return count, True, whole
+    return count + whole, whole * ENTRY_BYTES != size or not 1 <= whole <= MOST_WORDS, 0
 
 
 @njit(cache=True)

@@ -7,7 +7,7 @@ body is not what its type says, so that the caller can count it; its bytes stay 
 import re
 import struct
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from typing import Any, ClassVar, Final, Literal, NamedTuple
 
@@ -17,8 +17,7 @@ from cobs import cobs
 
 from decoders import formats as f
 from decoders.framing import HEADER, Packet, PacketFramer, Packets
-from decoders.kernels429 import entries
-from decoders.kernels_link import CRC_RESIDUE, described, intact
+from decoders.kernels_link import CRC_RESIDUE, described, entries, intact
 
 __all__ = [
     "ChannelCount",
@@ -134,27 +133,26 @@ class Framer(PacketFramer):
 
     def feed(self, data: bytes) -> list[Packet]:
         """Packets completed by the next bytes of a stream (COBS, each closed by 0x00)."""
-        decoded, found, _ = self._unstuff([data])
+        decoded, found, _ = self._unstuff(data)
         if not len(found):
             return []
         whole, new = decoded.tobytes(), tuple.__new__
         return [new(Packet, _fields(size)(whole, begin)) for begin, size, _ in found.tolist()]
 
-    def frame(self, chunks: Sequence[bytes]) -> Packets:
-        """Packets completed by the next chunks of a stream."""
-        decoded, found, carried = self._unstuff(chunks)
+    def frame(self, data: npt.NDArray[np.uint8], ends: npt.NDArray[np.int64]) -> Packets:
+        """Packets completed by the next chunks of a stream, which lie one behind the other and end at `ends`."""
+        decoded, found, carried = self._unstuff(data.data)
         header, chunk = np.empty(len(found), HEADER), np.empty(len(found), np.int64)
-        ends = np.fromiter(map(len, chunks), np.int64, len(chunks)).cumsum()
         described(decoded, found, ends + carried, header.view(np.uint64).reshape(-1, 2), chunk)
         return Packets(header, found[:, 0] + f.LINK_HEADER_BYTES, found[:, 1] - SHORTEST, chunk, decoded)
 
-    def _unstuff(self, chunks: Sequence[bytes]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64], int]:
+    def _unstuff(self, new: bytes | memoryview) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64], int]:
         """A copy of the stream in which packets lie without COBS; of each (n, 3) start, size, and the place behind it.
 
         And how many bytes of earlier chunks come before these. A compiled loop takes intact runs, which nearly all are.
         """
         carried = bytes(self._run)
-        stream = b"".join([carried, *chunks])
+        stream = b"".join((carried, new))
         self.received += len(stream) - len(carried)
         at = len(carried) if self._overlong else 0
         if not self._overlong:
@@ -266,19 +264,16 @@ def words429(packet: Packet) -> TimedWords:
     return TimedWords(time_ns, pairs["word"], leftover, leftover == 0 and 1 <= count <= f.LINK_MAX_WORDS)
 
 
-def joined429(
-    times_ns: npt.NDArray[np.int64], offsets_ns: npt.NDArray[np.int64], sizes: npt.NDArray[np.int64], bodies: bytes
-) -> Joined:
-    """The words of ARINC 429 packets (m,) of given device times, within 292 years, and bodies one behind the other.
+def joined429(packet: Packet, offset_ns: int) -> Joined:
+    """The words of an ARINC 429 packet of a device time within 292 years.
 
-    Offsets (m,) lead from device times to the common ones.
+    The offset leads from device times to the common ones.
     """
-    most = len(bodies) // ENTRY_429.itemsize
+    most = len(packet.body) // ENTRY_429.itemsize
     time_ns, sent_ns, words = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.uint32)
-    count, malformed, left_out = entries(
-        times_ns, offsets_ns, sizes, np.frombuffer(bodies, np.uint8), time_ns, sent_ns, words
-    )
-    return Joined(time_ns[:count], sent_ns[:count], words[:count], malformed, left_out)
+    body = np.frombuffer(packet.body, np.uint8)
+    count, malformed, left_out = entries(body, 0, len(body), packet.time_ns, offset_ns, time_ns, sent_ns, words, 0)
+    return Joined(time_ns[:count], sent_ns[:count], words[:count], int(malformed), left_out)
 
 
 def radar_word(packet: Packet) -> RadarWord:

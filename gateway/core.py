@@ -5,8 +5,9 @@ interrupts and no more; the run ends with a non-zero exit all the same. A core t
 many, and its next verdict says so; the recording stays whole.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
+from gateway.chunks import Block
 from gateway.events import Event
 from gateway.pipeline import Pipeline
 from gateway.queues import OVERHEAD_BYTES, ByteQueue
@@ -37,13 +38,13 @@ class Core:
             self._failed(f"record {record.sequence}", error)
             self._pipeline = self._build(self._pipeline)
 
-    def process_all(self, records: Sequence[Record]) -> None:
+    def process_all(self, block: Block) -> None:
         """Emit the events of many records, the same as one by one; a failure costs the rest of them."""
         try:
-            for event in self._pipeline.feed_all(records):
+            for event in self._pipeline.feed_all(block):
                 self._say(event)
         except Exception as error:  # noqa: BLE001 # as in process
-            self._failed(f"records {records[0].sequence} to {records[-1].sequence}", error)
+            self._failed(f"records {block.first.sequence} to {block.last.sequence}", error)
             self._pipeline = self._build(self._pipeline)
 
     def finish(self) -> None:

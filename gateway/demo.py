@@ -239,9 +239,9 @@ def _listen(leg: Leg, gateway: "subprocess.Popen[str]", console: Console) -> Non
             leg.listening.set()
         elif event["type"] == "integrity":
             figures = f"N {event['n_pairs']:3d}"
-            if event["q"] is not None:
+            if event["threshold"] is not None:
                 figures += f"  Q {event['q']:6.1f} against {event['threshold']:.1f}"
-            why = f"  {event['reasons'][0]}" if event["verdict"] == UNAVAILABLE else ""
+            why = "" if event["verdict"] == OK else f"  {event['reasons'][0]}"
             verdict = Text(event["verdict"], COLOURS[event["verdict"]])
             console.print(Text.assemble(f"scan {event['scan']:2d}  ", verdict, f"  {figures}{why}"))
 

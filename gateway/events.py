@@ -63,6 +63,7 @@ class IntegrityEvent(Event):
     scan: int
     method: str
     n_pairs: int
+    scans: int
     t_bins2: float | None
     t_normalised: float | None
     q: float | None
@@ -71,9 +72,15 @@ class IntegrityEvent(Event):
     mean_bins: float | None
     mean_stderr_bins: float | None
     unmatched_radar: float | None
+    unmatched_radar_limit: float | None
     unmatched_dem: float | None
+    unmatched_dem_limit: float | None
+    level: float | None
     mdb_bins: float | None
     calibration: str
+    offset_north_m: float | None
+    offset_east_m: float | None
+    offset_confidence: float | None
     verdict: str
     reasons: tuple[str, ...]
 

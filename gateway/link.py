@@ -161,13 +161,16 @@ class Link:
         self.next_sequence = (packet.sequence + 1) % SEQUENCE_RANGE
         return True
 
-    def count_plain(self, packets: Packets, own: NDArray[np.intp]) -> None:
-        """Count those packets of words that are this bridge's, which follow the one before and each other."""
+    def count_plain(self, packets: Packets, own: NDArray[np.intp], latest_ns: int) -> None:
+        """Count those packets that are this bridge's, which follow the one before and each other.
+
+        `latest_ns` is the device time of the last words.
+        """
         self.counters["packets"] += len(own)
+        self.losses["packets lost"] += 0  # losses are told in the order in which they were counted first
         self._recent.extend(packets, own[-RECENT:].tolist())
-        newest = packets.header[own[-1]]
-        self.next_sequence = (int(newest["sequence"]) + 1) % SEQUENCE_RANGE
-        self.latest_ns = int(newest["time_ns"])
+        self.next_sequence = (int(packets.header["sequence"][own[-1]]) + 1) % SEQUENCE_RANGE
+        self.latest_ns = latest_ns
 
     def _count_flags(self, flags: int) -> None:
         for bit, name in FLAG_NAMES.items():

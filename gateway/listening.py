@@ -5,31 +5,19 @@ waits and is called before anything changes how words are to be read, and `read_
 called as soon as one may end its sweep.
 """
 
-from collections import Counter
 from collections.abc import Callable, Sequence
-from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from decoders import formats as f
-from decoders.racklink import ENTRY_429, MalformedBody, Packet, heartbeat, hello, radar_word
+from decoders.racklink import ENTRY_429, MalformedBody, Packet, heartbeat, hello, joined429, radar_word
 from gateway.channels import Channel429, Channel708
+from gateway.chunks import DROPPED_BEFORE, MONOTONIC_NS, NUMBER, Chunks
 from gateway.config import RackConfig, profile_of
 from gateway.hearing import QUIET_NS, RADAR, Hearing
 from gateway.link import SPOILT, Link
-from gateway.plain import (
-    CHANNELS,
-    COUNT_BYTES,
-    LATEST_DEVICE_NS,
-    RADIALS,
-    WORDS,
-    Batch,
-    Ways,
-    count_plain,
-    framed,
-    gathered,
-)
+from gateway.plain import CAREFUL, CHANNELS, LATEST_DEVICE_NS, NEVER_NS, Batch, Laid, Ways, framed, take_plain
 from gateway.records import Raw
 from gateway.telling import Telling
 from gateway.timebase import Timebase
@@ -37,7 +25,9 @@ from gateway.waiting import LONGEST_WAIT_NS, MOST_RADIALS, WAIT_NS, WaitingRadia
 from monitor.quantities import are_distinct
 
 Place = tuple[str, int]  # adapter and channel
-WORTH_WHILE = 16  # packets: fewer are taken sooner one by one
+WORTH_WHILE = 4  # packets: fewer are taken sooner one by one
+LATEST_HOST_NS = np.uint64(np.iinfo(np.int64).max)
+MOST_HEARTBEATS = 16  # taken at once
 
 
 class Listener:
@@ -57,6 +47,7 @@ class Listener:
         self.links = {a.name: Link(a, profile) for a in config.adapters}
         self.hearing = Hearing({name: link.advice for name, link in self.links.items()})
         self.timebase = Timebase([*self.links])
+        self._numbers = {name: number for number, name in enumerate(self.links)}
         self.words: dict[Place, WaitingWords] = {}
         self.radials = WaitingRadials()
         self.chunks_of_unknown_adapter = 0
@@ -108,103 +99,122 @@ class Listener:
         for packet in link.framer.feed(record.data):
             self._packet(link, packet, record)
 
-    def framed(self, records: Sequence[Raw]) -> Batch:
-        """The packets that chunks of known adapters complete, before which nothing was dropped; for `take_all`."""
-        return framed([*self.links.values()], records)
+    def alone(self, chunks: Chunks) -> list[int]:
+        """The chunks that must be taken one by one.
 
-    def take_all(self, records: Sequence[Raw], batch: Batch) -> None:
+        What was dropped before a chunk is owned up to by the next verdict, and not by one before.
+        """
+        dropped, monotonic_ns = chunks.columns[DROPPED_BEFORE], chunks.columns[MONOTONIC_NS]
+        unusual = (self._link_of(chunks) < 0) | (dropped > 0) | (monotonic_ns > LATEST_HOST_NS)
+        return np.flatnonzero(unusual).tolist()
+
+    def _link_of(self, chunks: Chunks) -> NDArray[np.int64]:
+        """Which of the links each chunk came from, -1 for an adapter that is not known."""
+        found = [self._numbers.get(chunks.adapters[number], -1) for number in range(len(chunks.adapters))]
+        of: NDArray[np.int64] = np.array(found, np.int64)[chunks.columns[NUMBER].astype(np.intp)]
+        return of
+
+    def framed(self, chunks: Chunks) -> Batch:
+        """The packets that chunks complete of which none must be taken alone; for `take_all`."""
+        return framed([*self.links.values()], self._link_of(chunks), chunks)
+
+    def take_all(self, chunks: Chunks, batch: Batch) -> None:
         """Take chunks and their packets: the same as one by one, and sooner."""
-        for name, count in Counter(map(attrgetter("adapter"), records)).items():
-            self.links[name].counters["chunks"] += count
-        for name, record in {record.adapter: record for record in records}.items():  # the last of each
-            self.hearing.bytes_came(name, record.stamp.monotonic_ns)
+        numbers, monotonic_ns = self._link_of(chunks), chunks.columns[MONOTONIC_NS]
+        for number, (name, link) in enumerate(self.links.items()):
+            own = np.flatnonzero(numbers == number)
+            if len(own):
+                link.counters["chunks"] += len(own)
+                self.hearing.bytes_came(name, int(monotonic_ns[own[-1]]))
         links = [*self.links.values()]
         at, end = 0, len(batch.link)
         while at < end:
             if end - at >= WORTH_WHILE:
-                at += self._take_plain(links, batch.rest(at))
+                at += self._take_plain(links, chunks, batch.rest(at))
             if at < end:
-                record = records[batch.record[at]]
+                record = chunks.record(batch.record[at])
                 self._telling.begin(record)
                 self._packet(links[batch.link[at]], batch.packets.packet(at), record)
                 at += 1
-        self._telling.begin(records[-1])
+        self._telling.begin(chunks.record(len(chunks) - 1))
 
-    def _take_plain(self, links: Sequence[Link], batch: Batch) -> int:
+    def _take_plain(self, links: Sequence[Link], chunks: Chunks, batch: Batch) -> int:
         """Take the packets in front of which there is nothing to say; how many these are."""
-        ways, radials = self._ways(links), self.radials
-        sequence = np.array([link.next_sequence for link in links], np.int64)
-        latest_ns = np.array([link.latest_ns for link in links], np.int64)
-        offset_ns = np.empty(len(batch.link), np.int64)
+        ways, radials = self._ways(), self.radials
+        newest = np.empty(len(ways.channels), np.int64)
+        arrived = np.empty((MOST_HEARTBEATS + 1, len(newest) + 1), np.int64)
+        awake = np.array([not self.hearing.is_quiet(name) for name in self.links])
+        sequence, latest_ns = np.array(
+            [[link.next_sequence for link in links], [link.latest_ns for link in links]], np.int64
+        )
         bits = radials.channel.profile.word_bits if radials.channel else 0
-        room = MOST_RADIALS - 1 - len(radials)
-        clocks, reference = self.timebase.clocks, self.timebase.reference
         header, start, size, _, data = batch.packets
-        count = count_plain(
-            header, start, size, data, batch.link, batch.host_ns, *ways, sequence, latest_ns,
-            clocks, reference, radials.watch.last, bits, room, self._longest_wait_ns, offset_ns,
+        count, beats, now_ns, laid = take_plain(
+            header, start, size, data, batch.link, batch.host_ns, *ways[1:], awake, sequence, latest_ns,
+            self.timebase.clocks, self.timebase.reference, radials.watch.last, bits, MOST_RADIALS - 1 - len(radials),
+            self._longest_wait_ns, newest, arrived,
         )  # fmt: skip
         if not count:
             return 0
-        self.now_ns = int(header["time_ns"][count - 1]) + int(offset_ns[count - 1])
-        self.now_host_ns = int(batch.host_ns[count - 1])
-        places = batch.link[:count] * CHANNELS + header["channel"][:count]
         for number, link in enumerate(links):
             own = np.flatnonzero(batch.link[:count] == number)
-            if not len(own):
-                continue
-            link.count_plain(batch.packets, own)
-            self.hearing.heard(link.config.name, int(batch.host_ns[own[-1]]))
-            for channel in np.flatnonzero(ways.kind[number]).tolist():
-                here = np.flatnonzero(places == number * CHANNELS + channel)
-                if len(here):
-                    self._put(link, channel, batch, here, offset_ns[here], int(ways.end_ns[number, channel]))
+            if len(own):
+                link.count_plain(batch.packets, own, int(latest_ns[number]))
+                self.hearing.heard(link.config.name, int(batch.host_ns[own[-1]]))
+        for beat in arrived[:beats].tolist():
+            self._count_words(ways, beat[1:])
+            self._telling.begin(chunks.record(batch.record[beat[0]]))
+            self._heartbeat(links[batch.link[beat[0]]], batch.packets.packet(beat[0]))
+        self._count_words(ways, arrived[beats, 1:].tolist())
+        if len(newest) and (latest := newest.max()) >= 0:
+            self.now_ns, self.now_host_ns = int(now_ns), int(batch.host_ns[latest])
+            self._put(ways, newest.tolist(), batch, Laid(*laid))
         return int(count)
 
-    def _ways(self, links: Sequence[Link]) -> Ways:
+    def _ways(self) -> Ways:
         """How the packets of each channel may be taken now."""
-        ways, radials = Ways.careful(len(links)), self.radials
-        for number, link in enumerate(links):
-            name = link.config.name
-            if self.hearing.is_quiet(name):
+        channels: list[tuple[Link, int, Channel429 | Channel708]] = []
+        waits: list[tuple[int, int]] = []
+        slot = np.full((len(self.links), CHANNELS), CAREFUL, np.int16)
+        for role, ((name, number), _) in self._users.items():
+            link, quiet = self.links[name], self.hearing.is_quiet
+            what = link.channels.get(number)
+            if what is None or what.role != role:
                 continue
-            for channel, what in link.channels.items():
-                here = name, channel
-                if here != self._users.get(what.role, (None, 0))[0]:
+            if isinstance(what, Channel708):
+                if self.radials.link is not link or self.radials.channel is not what or quiet(RADAR):
                     continue
-                if isinstance(what, Channel708):
-                    if radials.link is link and radials.channel is what and not self.hearing.is_quiet(RADAR):
-                        ways.kind[number, channel] = RADIALS
-                elif not what.is_panel and not self.hearing.is_quiet(f"{name}/{channel}"):
-                    ways.kind[number, channel] = WORDS
-                    waiting = self.words.get(here)
-                    if waiting and waiting.until_ns is not None:
-                        ways.end_ns[number, channel] = waiting.end_ns
-                        ways.until_ns[number, channel] = waiting.until_ns
-        return ways
+            elif what.is_panel or quiet(f"{name}/{number}"):
+                continue
+            slot[self._numbers[name], number] = len(channels)
+            channels.append((link, number, what))
+            waiting = self.words.get((name, number))
+            waits.append((waiting.end_ns, waiting.until_ns) if waiting and waiting.until_ns else (0, NEVER_NS))
+        end_ns, until_ns = np.array(waits, np.int64).reshape(-1, 2).T.copy()
+        is_radar = np.array([isinstance(what, Channel708) for _, _, what in channels], np.bool_)
+        return Ways(channels, slot, is_radar, end_ns, until_ns)
 
-    def _put(
-        self, link: Link, number: int, batch: Batch, here: NDArray[np.intp], offset_ns: NDArray[np.int64], end_ns: int
-    ) -> None:
-        """Let the plain packets `here` of a channel wait; offsets lead from their device times to the common ones."""
-        header, start, size, _, data = batch.packets
-        host_ns, times_ns = int(batch.host_ns[here[-1]]), header["time_ns"][here].astype(np.int64)
-        channel, sizes = link.channels[number], size[here]
-        self._users[channel.role] = (link.config.name, number), host_ns
-        if isinstance(channel, Channel429):
-            words = int(sizes.sum()) // ENTRY_429.itemsize
-            link.counters["words_429"] += words
-            self.hearing.heard(f"{link.config.name}/{number}", host_ns)
-            bodies = gathered(data, start[here], sizes).tobytes()
-            waiting = self._waiting((link.config.name, number), channel)
-            waiting.put(times_ns, sizes, bodies, offset_ns, end_ns)
-        else:
-            words = len(here)
-            link.counters["words_708"] += words
-            self.hearing.heard(RADAR, host_ns)
-            bodies = gathered(data, start[here] + COUNT_BYTES, sizes - COUNT_BYTES).tobytes()
-            self.radials.put_all(link, channel, times_ns + offset_ns, bodies)
-        link.books[number].arrived += words
+    def _count_words(self, ways: Ways, arrived: Sequence[int]) -> None:
+        """Count words of plain packets, by slot."""
+        for (link, number, channel), words in zip(ways.channels, arrived, strict=True):
+            if words:
+                link.counters["words_429" if isinstance(channel, Channel429) else "words_708"] += words
+                link.books[number].arrived += words
+
+    def _put(self, ways: Ways, newest: Sequence[int], batch: Batch, laid: Laid) -> None:
+        """Let the words of plain packets wait, by slot the newest of which is told."""
+        for slot, ((link, number, channel), k) in enumerate(zip(ways.channels, newest, strict=True)):
+            if k < 0:
+                continue
+            name, host_ns = link.config.name, int(batch.host_ns[k])
+            self._users[channel.role] = (name, number), host_ns
+            if isinstance(channel, Channel429):
+                self.hearing.heard(f"{name}/{number}", host_ns)
+                joined = laid.of(slot)
+                self._waiting((name, number), channel).put(joined, int(ways.until_ns[slot]), int(ways.end_ns[slot]))
+            else:
+                self.hearing.heard(RADAR, host_ns)
+                self.radials.put_all(link, channel, laid.radar_ns, laid.radar.data)
 
     @property
     def _longest_wait_ns(self) -> int:
@@ -212,7 +222,7 @@ class Listener:
 
     def _waiting(self, here: Place, channel: Channel429) -> WaitingWords:
         if here not in self.words:
-            self.words[here] = WaitingWords(channel, self._longest_wait_ns)
+            self.words[here] = WaitingWords(channel)
         return self.words[here]
 
     def _packet(self, link: Link, packet: Packet, record: Raw) -> None:
@@ -238,10 +248,14 @@ class Listener:
             link.hello(said)
             self._expect(link, record)
         elif packet.type == f.HEARTBEAT:
-            if lost := link.heartbeat(heartbeat(packet)):
-                self._telling.tell(record.adapter, "LOSS", ", ".join(f"{count} {what}" for what, count in lost.items()))
+            self._heartbeat(link, packet)
         elif packet.type != f.TIME_MARK:
             link.counters["packets_of_unknown_type"] += 1
+
+    def _heartbeat(self, link: Link, packet: Packet) -> None:
+        if lost := link.heartbeat(heartbeat(packet)):
+            what = ", ".join(f"{count} {what}" for what, count in lost.items())
+            self._telling.tell(link.config.name, "LOSS", what)
 
     def _hear(self, source: str, record: Raw) -> None:
         if reason := self.hearing.heard(source, record.stamp.monotonic_ns):
@@ -310,8 +324,9 @@ class Listener:
         if overtakes or channel.is_panel:
             self._read()
         waiting = self._waiting(here, channel)
+        until_ns = packet.time_ns + self._longest_wait_ns if waiting.until_ns is None else waiting.until_ns
         end_ns = packet.time_ns + int.from_bytes(packet.body[-8:-4], "little")
-        waiting.put([packet.time_ns], [len(packet.body)], packet.body, [offset_ns], end_ns)
+        waiting.put(joined429(packet, offset_ns), until_ns, end_ns)
         if channel.is_panel:  # the radials before a command are compared with the one before it, those behind with it
             self._read()
 

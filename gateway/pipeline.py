@@ -5,7 +5,7 @@ ends or a tick asks for the state, or a second of them has gathered, and are the
 """
 
 from collections import Counter
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from operator import itemgetter
 
@@ -16,11 +16,13 @@ from decoders import formats as f
 from decoders.arinc708 import Radials
 from decoders.racklink import Joined
 from gateway.channels import Channel429
+from gateway.chunks import Block, Chunks
 from gateway.config import RackConfig
 from gateway.events import Event, IntegrityEvent, ScanEvent, StateEvent, SummaryEvent
 from gateway.hearing import RADAR
 from gateway.link import Link
 from gateway.listening import Listener
+from gateway.plain import Batch
 from gateway.records import Raw, Record, Status, Tick
 from gateway.telling import Telling
 from monitor.aircraft import Aircraft, status_name
@@ -78,32 +80,35 @@ class Pipeline:
         self._take(record)
         return self._telling.given()
 
-    def feed_all(self, records: Sequence[Record]) -> list[Event]:
+    def feed_all(self, block: Block) -> list[Event]:
         """The events that many records cause: the same as one by one, and sooner."""
-        begin, links = 0, self.listener.links
-        for end in (*(k for k, record in enumerate(records) if _stands_alone(record, links)), len(records)):
-            self._take_all(records[begin:end])
-            for record in records[end : end + 1]:
-                self._take(record)
+        begin, chunks = 0, block.chunks
+        for end in (*self.listener.alone(chunks), len(chunks)):
+            self._take_all(block.part(begin, end))
+            if end < len(chunks):
+                self._take(chunks.record(end))
             begin = end + 1
         return self._telling.given()
 
-    def _take_all(self, records: Sequence[Record]) -> None:
+    def _take_all(self, block: Block) -> None:
         """Take records whose chunks may be framed together."""
-        batch = self.listener.framed([record for record in records if isinstance(record, Raw)])
-        begin = chunks = 0
-        for end in (*(k for k, record in enumerate(records) if not isinstance(record, Raw)), len(records)):
-            others = records[end : end + 1]
-            if any(self._is_idle(record, records[begin].stamp.monotonic_ns) for record in others):
+        chunks, batch = block.chunks, self.listener.framed(block.chunks)
+        begin, since_ns = 0, None
+        for end, record in block.others:
+            if since_ns is None:
+                since_ns = (chunks.record(begin) if begin < end else record).stamp.monotonic_ns
+            if self._is_idle(record, since_ns):
                 continue
-            if some := [record for record in records[begin:end] if isinstance(record, Raw)]:
-                self.listener.take_all(some, batch.of_records(chunks, chunks + len(some)))
-                chunks += len(some)
-            for record in others:
-                self._take(record)
-            begin = end + 1
-        if records:
-            self._telling.begin(records[-1])
+            self._listen(chunks, batch, begin, end)
+            self._take(record)
+            begin, since_ns = end, None
+        self._listen(chunks, batch, begin, len(chunks))
+        if chunks or block.others:
+            self._telling.begin(block.last)
+
+    def _listen(self, chunks: Chunks, batch: Batch, begin: int, end: int) -> None:
+        if begin < end:
+            self.listener.take_all(chunks.part(begin, end), batch.of_records(begin, end))
 
     def _is_idle(self, record: Record, since_ns: int) -> bool:
         """Whether a tick will find nothing to say, whatever comes before it from `since_ns` on."""
@@ -296,8 +301,3 @@ class Pipeline:
         values["utc_s"] = None if utc.utc_ns is None else utc.utc_ns / 1e9
         validity["utc_s"] = utc.validity
         return StateEvent(*self._telling.stamp, values, validity, age_s)
-
-
-def _stands_alone(record: Record, links: Container[str]) -> bool:
-    """What was dropped before a chunk is owned up to by the next verdict, and not by one before."""
-    return isinstance(record, Raw) and (record.dropped_before > 0 or record.adapter not in links)

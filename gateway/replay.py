@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from itertools import groupby, islice
 
+from gateway.chunks import Block
 from gateway.config import RackConfig
 from gateway.core import Core, Emit
 from gateway.errors import GatewayError
@@ -57,7 +58,11 @@ def replay(
                 pace.wait(block[0][0])
             if halt.is_set():
                 return core.failures
-            core.process_all([_renamed(record, names or {}) for _, record in block])
+            records = [_renamed(record, names or {}) for _, record in block]
+            if at_once == 1:
+                core.process(records[0])
+            else:
+                core.process_all(Block.of([records]))
             if core.unheard:
                 raise core.unheard
     if recording.records and not gate.open and (stop_s is None or stop_s >= start_s):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decoders import formats as f
-from decoders.racklink import ENTRY_429, Joined, joined429
+from decoders.racklink import Joined
 from gateway.channels import Channel429, Channel708
 from gateway.link import Link
 from monitor.scans import SweepWatch
@@ -32,43 +32,32 @@ class Radar(NamedTuple):
 
 
 class WaitingWords:
-    """Packets of one ARINC 429 channel in order of time."""
+    """Words of one ARINC 429 channel in order of time."""
 
-    def __init__(self, channel: Channel429, longest_ns: int) -> None:
+    def __init__(self, channel: Channel429) -> None:
         self.channel = channel
-        self._longest_ns = longest_ns
         self.end_ns = 0  # of the last word that waits
-        self._times_ns: list[Numbers] = []
-        self._offsets_ns: list[Numbers] = []
-        self._sizes: list[Numbers] = []
-        self._bodies: list[bytes] = []
+        self.until_ns: int | None = None  # device time from which on no packet can join; None while nothing waits
+        self._joined: list[Joined] = []
 
     def __len__(self) -> int:
-        """Words that wait."""
-        return sum(map(len, self._bodies)) // ENTRY_429.itemsize
+        """Words that wait, those included that will be left out."""
+        return sum(len(joined.words) + joined.left_out for joined in self._joined)
 
-    @property
-    def until_ns(self) -> int | None:
-        """Device time from which on no packet can join, or None while nothing waits."""
-        return int(self._times_ns[0][0]) + self._longest_ns if self._times_ns else None
-
-    def put(self, times_ns: Numbers, sizes: Numbers, bodies: bytes, offsets_ns: Numbers, end_ns: int) -> None:
-        """Let packets wait, their bodies one behind the other; offsets lead from device times to the common ones."""
-        self._times_ns.append(times_ns)
-        self._sizes.append(sizes)
-        self._bodies.append(bodies)
-        self._offsets_ns.append(offsets_ns)
-        self.end_ns = end_ns
+    def put(self, joined: Joined, until_ns: int, end_ns: int) -> None:
+        """Let words wait, and say until when others can join them and when the last one was sent."""
+        self._joined.append(joined)
+        self.until_ns, self.end_ns = until_ns, end_ns
 
     def take(self) -> Joined | None:
         """All that waits, if anything does."""
-        if not self._sizes:
+        if not self._joined:
             return None
-        waiting_ns = np.concatenate(self._times_ns, dtype=np.int64), np.concatenate(self._offsets_ns, dtype=np.int64)
-        joined = joined429(*waiting_ns, np.concatenate(self._sizes, dtype=np.int64), b"".join(self._bodies))
-        for waiting in (self._times_ns, self._sizes, self._offsets_ns, self._bodies):
-            waiting.clear()
-        return joined
+        time_ns, sent_ns, words, malformed, left_out = zip(*self._joined, strict=True)
+        self._joined, self.until_ns = [], None
+        return Joined(
+            np.concatenate(time_ns), np.concatenate(sent_ns), np.concatenate(words), sum(malformed), sum(left_out)
+        )
 
 
 class WaitingRadials:
@@ -80,7 +69,7 @@ class WaitingRadials:
         self.watch = SweepWatch()
         self._count = 0
         self._times_ns: list[Numbers] = []
-        self._words: list[bytes] = []
+        self._words: list[bytes | memoryview] = []
 
     def __len__(self) -> int:
         """Words that wait."""
@@ -92,7 +81,7 @@ class WaitingRadials:
         self.put_all(link, channel, [device_ns + offset_ns], word)
         return goes_on and len(self) < MOST_RADIALS
 
-    def put_all(self, link: Link, channel: Channel708, times_ns: Numbers, words: bytes) -> None:
+    def put_all(self, link: Link, channel: Channel708, times_ns: Numbers, words: bytes | memoryview) -> None:
         """Let words wait that `watch` has seen and that may, one behind the other."""
         self.link, self.channel = link, channel
         self._count += len(times_ns)

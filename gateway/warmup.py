@@ -4,9 +4,9 @@ import numpy as np
 
 from decoders.arinc429 import decode
 from decoders.definitions import load_definitions
-from decoders.formats import ENTRY_429_BYTES, KIND_429_HIGH
+from decoders.formats import KIND_429_HIGH, WORDS_429
 from decoders.health429 import BusHealth
-from decoders.racklink import Framer, joined429
+from decoders.racklink import Framer, Packet, joined429
 from gateway.timebase import Timebase
 from monitor.aircraft import Aircraft
 from monitor.scans import SweepWatch
@@ -23,8 +23,7 @@ def warm_up_words() -> None:
     SweepWatch().goes_on(0, 0)
     definitions = load_definitions("gnss_743a")
     entries = b"".join(bytes(4) + _word(label).to_bytes(4, "little") for label in (COARSE, FINE))
-    one = np.zeros(1, np.int64)
-    joined = joined429(one, one, np.full(1, 2 * ENTRY_429_BYTES), entries)
+    joined = joined429(Packet(WORDS_429, 0, 0, 0, 0, entries), 0)
     values = decode(joined.words, definitions)
     health = BusHealth(definitions, "wire", KIND_429_HIGH)
     for _ in health.feed(joined.time_ns + np.array([0, LATER_NS]), joined.words, values):

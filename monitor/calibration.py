@@ -1,32 +1,39 @@
-"""How disparities are distributed when nothing is wrong, measured for one radar and one class of terrain.
+"""What scans are like when nothing is wrong, measured for one radar and one class of terrain: the file of it."""
 
-The robust fit follows from the heavy tails of real terrain: the median m, a robust spread r (normalised median absolute
-deviation), the clip at +-k r, the root mean square sigma of what the clip leaves, and the variance factor
-c = E[(Q - N)^2] / E[2 N], which is 1 for independent normal disparities and grows with errors common to a scan.
-"""
-
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from scipy.special import ndtri
 
-from monitor.disparity import clipped, robust_statistic, robust_threshold
-
-QUARTILE = float(ndtri(0.75))  # of a normal distribution: half of it lies nearer to its median
 CLIP_FACTOR = 2.0
 
 
 class CheckedRate(BaseModel):
-    """What a configured P_FA came to on scans that the fit had not seen."""
+    """What a configured P_FA came to, with all tests, on scans that the fit had not seen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     p_fa: float
     scans: int
     alerts: int
+
+
+class UnmatchedModel(BaseModel):
+    """How large a share of one thread's eligible shadows has no partner when nothing is wrong.
+
+    `overdispersion` is rho of the variance m (1 - m) (1 / n + rho): 0 for shadows that stand or fall each by itself.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    mean: float = Field(gt=0, lt=1)
+    overdispersion: float = Field(ge=0, le=1)
+
+
+class LevelLimits(BaseModel):
+    """Between which signal levels the fault-free scans lay."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    lowest: float
+    highest: float
 
 
 class Calibration(BaseModel):
@@ -43,6 +50,9 @@ class Calibration(BaseModel):
     sigma_bins: float = Field(gt=0)
     rms_bins: float = Field(gt=0)
     variance_factor: float = Field(ge=1)
+    unmatched_radar: UnmatchedModel | None = None
+    unmatched_dem: UnmatchedModel | None = None
+    level: LevelLimits | None = None
     checked: tuple[CheckedRate, ...] = ()
 
     @property
@@ -96,58 +106,3 @@ def load_calibration(path: Path) -> Calibration:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "the file"
         raise ValueError(f"calibration file {path}: {place}: {first['msg']}") from error
-
-
-def fit(
-    scans: Sequence[NDArray[np.float64]],
-    check: Sequence[NDArray[np.float64]],
-    p_fas: Sequence[float],
-    minimum_pairs: int,
-    *,
-    name: str,
-    provenance: str,
-    bins: int | None = None,
-    range_nm: float | None = None,
-) -> Calibration:
-    """Fit to the disparities of fault-free scans, and count on other scans how often each P_FA would have alerted.
-
-    Each scan is an array of disparities in bins; those with fewer than `minimum_pairs` are left out, as in flight.
-    """
-    usable = [d for d in scans if len(d) >= minimum_pairs]
-    if len(usable) < 2:
-        raise ValueError(
-            f"only {len(usable)} scans have {minimum_pairs} pairs: fly longer, lower or over rougher terrain"
-        )
-    pooled = np.concatenate(usable)
-    median = float(np.median(pooled))
-    spread = float(np.median(np.abs(pooled - median)) / QUARTILE)
-    if not spread:
-        raise ValueError("half of the disparities are equal, so they have no spread: fit to a radar with its noise")
-    sigma = float(np.sqrt(np.mean(clipped(pooled, median, CLIP_FACTOR * spread) ** 2)))
-    q = np.array([robust_statistic(d, median, CLIP_FACTOR * spread, sigma) for d in usable])
-    n = np.array([len(d) for d in usable])
-    factor = max(1.0, float(np.mean((q - n) ** 2) / np.mean(2 * n)))
-    held_out = [d for d in check if len(d) >= minimum_pairs]
-    rates = [
-        CheckedRate(
-            p_fa=p,
-            scans=len(held_out),
-            alerts=sum(
-                robust_statistic(d, median, CLIP_FACTOR * spread, sigma) > robust_threshold(len(d), p, factor)
-                for d in held_out
-            ),
-        )
-        for p in p_fas
-    ]
-    return Calibration(
-        name=name,
-        provenance=provenance,
-        bins=bins,
-        range_nm=range_nm,
-        median_bins=median,
-        spread_bins=spread,
-        sigma_bins=sigma,
-        rms_bins=float(np.sqrt(np.mean(pooled**2))),
-        variance_factor=factor,
-        checked=tuple(rates),
-    )

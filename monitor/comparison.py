@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from monitor.geodesy import NM_M
 from monitor.prediction import Beam, Pointing, predict
+from monitor.sample import ScanSample, Unmatched, signal_level
 from monitor.scans import Scan
 from monitor.settings import MonitorSettings
 from monitor.shade import pair, radar_states, shadows, unmatched_share
@@ -26,13 +27,17 @@ class Comparison:
     pair_radial: NDArray[np.int64]
     radar_centre: NDArray[np.float64]
     dem_centre: NDArray[np.float64]
-    unmatched_radar: float | None
-    unmatched_dem: float | None
+    unmatched_radar: Unmatched
+    unmatched_dem: Unmatched
 
     @property
     def disparities(self) -> NDArray[np.float64]:
         """D of eq. (6), range bins."""
         return self.radar_centre - self.dem_centre
+
+    def sample(self, scan: Scan) -> ScanSample:
+        """What the tests look at, of the scan that was compared."""
+        return ScanSample(self.disparities, self.unmatched_radar, self.unmatched_dem, signal_level(scan.bins))
 
 
 def compare(
@@ -57,8 +62,8 @@ def compare(
         pairs["radial"],
         whole["centre"][pairs["radar"]],
         foreseen["centre"][pairs["dem"]],
-        _share(*unmatched_share(seen, predicted, dem)),
-        _share(*unmatched_share(predicted, seen, radar)),
+        Unmatched(*unmatched_share(seen, predicted, dem)),
+        Unmatched(*unmatched_share(predicted, seen, radar)),
     ), int(np.count_nonzero(void))
 
 
@@ -70,7 +75,3 @@ def thin(scan_angle_deg: NDArray[np.float64], spacing_deg: float) -> NDArray[np.
     cell = np.round(scan_angle_deg / spacing_deg)
     order = np.lexsort((np.abs(scan_angle_deg - cell * spacing_deg), cell))
     return np.sort(order[np.diff(cell[order], prepend=-np.inf) > 0])
-
-
-def _share(unmatched: int, eligible: int) -> float | None:
-    return unmatched / eligible if eligible else None

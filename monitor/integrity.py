@@ -1,6 +1,7 @@
 """One scan, the aircraft's state and the terrain to a verdict: does the stored terrain agree with the radar?"""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,21 +10,19 @@ from decoders.formats import MODES_708
 from monitor.aircraft import Aircraft
 from monitor.calibration import NO_CALIBRATION, Calibration, uncalibrated
 from monitor.comparison import Comparison, compare, thin
-from monitor.disparity import (
-    minimum_detectable_bias,
-    normalised,
-    robust_statistic,
-    robust_threshold,
-    statistic,
-    threshold,
-)
+from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, Test, examine
+from monitor.disparity import statistic, threshold
 from monitor.geodesy import LONGEST_RANGE_NM
+from monitor.hysteresis import Hysteresis
+from monitor.offset import Search
 from monitor.pointing import point
 from monitor.prediction import Pointing
+from monitor.sample import NOTHING, ScanSample
 from monitor.scans import Scan
 from monitor.settings import MonitorSettings
 from monitor.terrain import Terrain
 from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
+from monitor.window import Window
 
 MOST_UNMATCHED = 0.6  # share of shadows; without a calibration more of them forbid an ok
 
@@ -37,6 +36,8 @@ class Monitor:
         self.terrain = terrain
         self.settings = settings or MonitorSettings()
         self.calibration = calibration
+        self._window = Window(self.settings.window_scans)
+        self._hysteresis = Hysteresis(self.settings.alert_scans, self.settings.clear_scans)
 
     def judge(self, scan: Scan, aircraft: Aircraft) -> tuple[Verdict, Comparison | None]:
         """The verdict on a scan; the comparison is None where the radar or the state did not allow one."""
@@ -52,7 +53,18 @@ class Monitor:
         comparison, lost = compare(scan, chosen[usable], pointing, self.terrain, self.settings)
         if lost:
             reasons.append(f"{lost} radials leave the terrain or cross voids")
-        return self._decide(scan, comparison, self._buried(pointing), reasons), comparison
+        verdict = self._decide(scan, comparison, self._buried(pointing), reasons)
+        if verdict.verdict == ALERT and self.settings.offset_search_m:
+            calibration = self.calibration or uncalibrated(scan.bins.shape[1])
+            search = Search(scan, chosen[usable], pointing, self.terrain, self.settings, calibration)
+            found = search.most_likely()
+            verdict = replace(
+                verdict,
+                offset_north_m=found.north_m,
+                offset_east_m=found.east_m,
+                offset_confidence=found.confidence,
+            )
+        return verdict, comparison
 
     def _refusal(self, scan: Scan) -> str | None:
         if scan.mode != MODES_708["map"]:
@@ -67,69 +79,64 @@ class Monitor:
             return f"the range bins look like {bits} bits each: check radar_profile, or the channel's profile"
         return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm) if self.calibration else None
 
+    def unavailable(self, scan: int, reasons: list[str]) -> Verdict:
+        """The verdict that nothing can be said about a scan that could not be compared."""
+        return self._told(scan, UNAVAILABLE, reasons, NOTHING, Findings(), 0)
+
     def _decide(self, scan: Scan, comparison: Comparison, doubts: list[str], reasons: list[str]) -> Verdict:
-        s, d = self.settings, comparison.disparities
-        c = self.calibration or uncalibrated(scan.bins.shape[1])
-        n = len(d)
-        reasons = [*doubts, *reasons]
-        if n < s.pairs_needed:
-            few = f"{n} pairs of shadows, {s.pairs_needed} needed"
-            return self.unavailable(scan.number, [few, *reasons], comparison)
-        q = robust_statistic(d, c.median_bins, c.clip_bins, c.sigma_bins)
-        t_normalised = normalised(d, c.rms_bins)
-        if s.method == "robust":
-            value, limit = q, robust_threshold(n, s.p_fa, c.variance_factor)
+        bins = scan.bins.shape[1]
+        now_ns, setting = int(scan.time_ns[-1]), (scan.range_nm, bins)
+        sample, scans = self._window.gather(now_ns, setting, comparison.sample(scan), self.settings.pairs_needed)
+        findings = examine(sample, self.settings, self.calibration or uncalibrated(bins))
+        unlike = self._unlike_calibration(sample)
+        if findings.alerts:
+            verdict, first = UNAVAILABLE if unlike else ALERT, [str(test) for test in findings.alerts]
+        elif findings.statistic is None:
+            verdict, first = UNAVAILABLE, [findings.blind]
         else:
-            value, limit = t_normalised, threshold(n, s.p_fa)
-        most = n * (c.clip_bins / c.sigma_bins) ** 2  # what Q comes to if every pair is clipped
-        if s.method == "robust" and most <= limit:
-            blind = (
-                f"{n} pairs cannot alert at P_FA {s.p_fa:g}: Q reaches {most:.1f} at most, its threshold is {limit:.1f}"
-            )
-            return self.unavailable(scan.number, [blind, *reasons], comparison)
-        if value > limit:
-            verdict = ALERT
-            reasons.insert(0, f"{'Q' if s.method == 'robust' else 'N T / sigma^2'} {value:.1f} exceeds {limit:.1f}")
-        else:
-            contradictions = self._contradictions(comparison, t_normalised)
-            verdict = UNAVAILABLE if doubts or contradictions else OK
-            reasons = [*contradictions, *reasons]
-        return Verdict(
-            scan=scan.number,
-            verdict=verdict,
-            reasons=tuple(reasons + self._caveats()),
-            n_pairs=n,
-            t_bins2=statistic(d),
-            t_normalised=t_normalised,
-            q=q,
-            threshold=limit,
-            mean_bins=float(np.mean(d)),
-            mean_stderr_bins=float(np.std(d, ddof=1) / math.sqrt(n)),
-            unmatched_radar=comparison.unmatched_radar,
-            unmatched_dem=comparison.unmatched_dem,
-            mdb_bins=minimum_detectable_bias(n, c.rms_bins, s.p_fa, s.p_md),
-            calibration=c.name,
+            first = self._contradictions(sample, findings)
+            verdict = UNAVAILABLE if first or doubts or unlike else OK
+        gathered = [f"pairs of the last {scans} scans together"] if scans > 1 else []
+        return self._told(
+            scan.number, verdict, [*unlike, *first, *doubts, *gathered, *reasons], sample, findings, scans
         )
 
-    def unavailable(self, scan: int, reasons: list[str], comparison: Comparison | None = None) -> Verdict:
-        """The verdict that nothing can be said about a scan, with whatever was measured all the same."""
-        d = comparison.disparities if comparison else np.empty(0)
+    def _told(
+        self, scan: int, verdict: str, reasons: list[str], sample: ScanSample, findings: Findings, scans: int
+    ) -> Verdict:
+        """A verdict with every number that there is, once it has settled."""
+        settled, why = self._hysteresis.settle(verdict)
+        d, radar, dem = sample.disparities, findings.unmatched_radar, findings.unmatched_dem
+        n, test = len(d), findings.statistic
         return Verdict(
             scan=scan,
-            verdict=UNAVAILABLE,
-            reasons=tuple(reasons + self._caveats()),
-            n_pairs=len(d),
-            t_bins2=statistic(d) if len(d) else None,
-            t_normalised=None,
-            q=None,
-            threshold=None,
-            mean_bins=float(np.mean(d)) if len(d) else None,
-            mean_stderr_bins=None,
-            unmatched_radar=comparison.unmatched_radar if comparison else None,
-            unmatched_dem=comparison.unmatched_dem if comparison else None,
-            mdb_bins=None,
+            verdict=settled,
+            reasons=(*why, *reasons, *self._caveats()),
+            n_pairs=n,
+            scans=scans,
+            t_bins2=statistic(d) if n else None,
+            t_normalised=findings.t_normalised,
+            q=findings.q,
+            threshold=test.limit if test else None,
+            mean_bins=float(np.mean(d)) if n else None,
+            mean_stderr_bins=float(np.std(d, ddof=1) / math.sqrt(n)) if test else None,
+            unmatched_radar=sample.unmatched_radar.share,
+            unmatched_radar_limit=radar.limit if radar else None,
+            unmatched_dem=sample.unmatched_dem.share,
+            unmatched_dem_limit=dem.limit if dem else None,
+            level=None if math.isnan(sample.level) else sample.level,
+            mdb_bins=findings.mdb_bins,
             calibration=self.calibration.name if self.calibration else NO_CALIBRATION,
         )
+
+    def _unlike_calibration(self, sample: ScanSample) -> list[str]:
+        """What makes the calibration, and with it every probability, worthless for a scan."""
+        c = self.calibration
+        if c is None or c.level is None or c.level.lowest <= sample.level <= c.level.highest:
+            return []
+        found = "nothing is lit" if math.isnan(sample.level) else f"the mean level is {sample.level:.2f}"
+        levels = f"{c.level.lowest:.2f} to {c.level.highest:.2f}"
+        return [f"{found} in the farther half, where calibration {c.name} has {levels}: check the radar's gain"]
 
     def _buried(self, pointing: Pointing) -> list[str]:
         """What forbids an ok where the aircraft is under the ground, as terrain in feet or a wrong datum puts it."""
@@ -137,21 +144,16 @@ class Monitor:
         below_m = float(np.fmax.reduce(ground_m - pointing.height_m, initial=0.0))
         return [f"the aircraft is {below_m:.0f} m below the stored terrain: check unit and datum"] if below_m else []
 
-    def _contradictions(self, comparison: Comparison, t_normalised: float) -> list[str]:
+    def _contradictions(self, sample: ScanSample, findings: Findings) -> list[str]:
         """What forbids an ok that rests on stated defaults: they may be too wide for this radar, and hide an error."""
         if self.calibration:
             return []
-        n = len(comparison.disparities)
         measures = (
-            ("N T / sigma^2", t_normalised, threshold(n, self.settings.p_fa)),
-            ("the unmatched share of radar shadows", comparison.unmatched_radar, MOST_UNMATCHED),
-            ("the unmatched share of terrain shadows", comparison.unmatched_dem, MOST_UNMATCHED),
+            Test("N T / sigma^2", findings.t_normalised or 0.0, threshold(len(sample.disparities), self.settings.p_fa)),
+            Test(RADAR_SHARE, sample.unmatched_radar.share or 0.0, MOST_UNMATCHED),
+            Test(DEM_SHARE, sample.unmatched_dem.share or 0.0, MOST_UNMATCHED),
         )
-        return [
-            f"without a calibration no ok: {name} {value:.3g} exceeds {limit:.3g}"
-            for name, value, limit in measures
-            if value is not None and value > limit
-        ]
+        return [f"without a calibration no ok: {test}" for test in measures if test.exceeded]
 
     def _caveats(self) -> list[str]:
         return ["no calibration loaded: stated defaults in use"] if self.calibration is None else []

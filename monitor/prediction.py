@@ -13,12 +13,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from monitor.ceiling import clear_m
 from monitor.geodesy import Ray, along, curvature_radii, ray
 from monitor.shade import DEM_INITIAL, walk
-from monitor.terrain import Grid, blend, corners, locate, sample
+from monitor.terrain import Grid, bilinear, blend, corners, locate, sample
 
 SETTLED = 0.1  # of a bin: how far a bin's ground may move it and its place still counts as found
 LEVELS = (16, 4, 1)  # bins whose ground is looked up at once: every 16th, every fourth, every one
+LANES = 16  # bins a loop takes at a time; the first looked up is a multiple, or the rest would go one by one
 MOST_LOOKS = 40  # half of them halve a range setting to less than a centimetre
 
 
@@ -42,6 +44,23 @@ class Pointing(NamedTuple):
     elevation_rad: NDArray[np.float64]
 
 
+class Bins(NamedTuple):
+    """Slant ranges in metres of the bins at each of `LEVELS`, and room to look up their ground. Made by `bins_at`."""
+
+    levels_m: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+    places: NDArray[np.float64]
+    post: NDArray[np.uint32]
+    pairs: NDArray[np.complex64]
+
+
+@njit(cache=True)
+def bins_at(ranges_m: NDArray[np.float64]) -> Bins:
+    """Bins at slant ranges (n,) in rising order."""
+    n = ranges_m.size
+    levels_m = (ranges_m[::16].copy(), ranges_m[::4].copy(), ranges_m.copy())
+    return Bins(levels_m, np.empty((5, n)), np.empty(n, np.uint32), np.empty((2, n), np.complex64))
+
+
 def predict(
     grid: Grid, pointing: Pointing, bins: int, bin_width_m: float, beam: Beam
 ) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
@@ -61,12 +80,13 @@ def _predict(  # type: ignore[no-untyped-def] # typed by predict
     states = np.full((azimuth_rad.size, ranges_m.size), DEM_INITIAL, np.int8)
     void = np.zeros(azimuth_rad.size, np.bool_)
     delta = np.empty(ranges_m.size)
+    bins = bins_at(ranges_m)
     for i in range(azimuth_rad.size):
         dmin = math.tan(elevation_rad[i] - half_beam_rad)
         dmax = math.tan(elevation_rad[i] + half_beam_rad)
         for f in range(fan_rad.size):
             azimuth = azimuth_rad[i] + fan_rad[f]
-            void[i] |= tangents(grid, latitude_deg[i], longitude_deg[i], height_m[i], azimuth, ranges_m, k, delta)
+            void[i] |= tangents(grid, latitude_deg[i], longitude_deg[i], height_m[i], azimuth, bins, k, dmin, delta)
             walk(delta, dmin, dmax, states[i])
     return states, void
 
@@ -78,8 +98,9 @@ def tangents(
     longitude_deg: float,
     height_m: float,
     azimuth_rad: float,
-    ranges_m: NDArray[np.float64],
+    bins: Bins,
     k: float,
+    dmin: float,
     delta: NDArray[np.float64],
 ) -> bool:
     """Tangent of the elevation of the ground at each slant range, into `delta`; True if any post was missing.
@@ -92,6 +113,9 @@ def tangents(
     bin before takes a processor several times as long as to look, so guesses come from every fourth bin instead, and
     theirs from every sixteenth. A bin that its own ground then moves by more than `SETTLED` is settled alone, so that
     every point lies within a tenth of a bin of the stored ground.
+
+    Bins before the first that might exceed `dmin` may get -infinity too: the machine stays in its first state there,
+    so none is looked up but the last, from whose ground the next may start. Curvature (k > 0) only lowers.
     """
     meridian, prime = curvature_radii(math.radians(latitude_deg))
     drop = 1 / (2 * k * math.sqrt(meridian * prime))
@@ -99,18 +123,16 @@ def tangents(
     if math.isnan(below):
         below = height_m
     track = _in_posts(grid, ray(latitude_deg, longitude_deg, (height_m + below) / 2, azimuth_rad))
-    ground, guessed = _look(grid.height_m, track, height_m, below, ranges_m)
+    ranges_m = bins.levels_m[-1]
     tolerance = SETTLED * (ranges_m[1] - ranges_m[0]) if ranges_m.size > 1 else 0.0
-    end = 0  # beyond the last bin that is not settled
-    for j in range(ranges_m.size):
-        depth = height_m - ground[j]
-        s = _distance(ranges_m[j], depth)
-        settled = (abs(s - guessed[j]) <= tolerance) & (s > 0)
-        delta[j] = _lowered(-depth / s, s * drop) if settled else math.nan
-        end = max(end, 0 if settled else j + 1)
-    first = np.searchsorted(ranges_m, abs(height_m - below), "right")
+    clear = clear_m(grid.ceiling_m, track, height_m, dmin, tolerance, ranges_m[-1]) if drop >= 0 else 0.0
+    begin = max(int(np.searchsorted(ranges_m, clear, "right")) - 1, 0) // LANES * LANES
+    _look(grid.height_m, track, height_m, below, bins, begin)
+    ground, guessed = bins.places[0], bins.places[2]
+    end = _settled(height_m, ground[begin:], guessed[begin:], ranges_m[begin:], tolerance, drop, delta[begin:])
+    first = max(begin, int(np.searchsorted(ranges_m, abs(height_m - below), "right")))
     delta[:first] = -math.inf
-    for j in range(first, end):
+    for j in range(first, begin + end):
         if math.isnan(delta[j]):
             for guess in (ground[j], ground[j - 1] if j else below):  # the second where the first leads over a void
                 ground[j] = _settle(grid.height_m, track, height_m, guess, ranges_m[j], tolerance)
@@ -126,33 +148,79 @@ def tangents(
 
 
 @njit(cache=True, error_model="numpy")
-def _look(post_m, track, height_m, below_m, ranges_m):  # type: ignore[no-untyped-def] # typed by tangents
-    """Ground for each bin, and the distance at which it was looked up.
+def _settled(height_m, ground, guessed, ranges_m, tolerance, drop, delta):  # type: ignore[no-untyped-def] # by tangents
+    """The tangents of bins that lie where they were guessed, NaN for others, and how many there are up to the last."""
+    end = 0
+    for j in range(ranges_m.size):
+        depth = height_m - ground[j]
+        s = _distance(ranges_m[j], depth)
+        settled = (abs(s - guessed[j]) <= tolerance) & (s > 0)
+        delta[j] = _lowered(-depth / s, s * drop) if settled else math.nan
+        end = max(end, 0 if settled else j + 1)
+    return end
 
-    Several plain loops, because each goes four bins at a time where one loop over all of it would go bin by bin.
+
+@njit(cache=True, error_model="numpy")
+def _look(post_m, track, height_m, below_m, bins, begin):  # type: ignore[no-untyped-def] # typed by tangents
+    """Ground for each bin from `begin` on into the first of `places`, where it was looked up into the third.
+
+    Several plain loops, because each goes four bins at a time where one loop over all of it would go bin by bin; all
+    count from 0, or numba would ask of each index whether it is negative.
     """
-    n = ranges_m.size
-    places, posts, pairs = np.empty((5, n)), np.empty((2, n), np.uint32), np.empty((2, n), np.complex64)
-    ground, guess, distance, south, east = places[0], places[1], places[2], places[3], places[4]
-    row, column, upper, lower = posts[0], posts[1], pairs[0], pairs[1]
-    ground[0] = below_m
+    inside = _inside(track, bins.levels_m[-1][-1], post_m.shape)
+    bins.places[0, 0] = below_m
     known = 1
-    for step in LEVELS:
-        range_m = ranges_m[::step]
+    for level in range(len(LEVELS)):
+        first = (
+            begin // (LANES * LEVELS[level]) * LANES if level else 0
+        )  # all of the first: they start from the ground below
+        range_m = bins.levels_m[level][first:]
         size = range_m.size
+        ground, guess, distance = bins.places[0][first:], bins.places[1][:size], bins.places[2][first:]
+        coarse = bins.places[0][first // 4 : known]
         for j in range(size):
-            guess[j] = ground[min(j + 2 >> 2, known - 1)]  # the nearest of the level before
+            guess[j] = coarse[min(j + 2 >> 2, coarse.size - 1)]  # the nearest of the level before
         for j in range(size):
             distance[j] = _distance(range_m[j], height_m - guess[j])
+        _heights(post_m, track, distance[:size], inside, bins, ground)
+        known = first + size
+
+
+@njit(cache=True, error_model="numpy")
+def _heights(post_m, track, distance, inside, bins, ground):  # type: ignore[no-untyped-def] # typed by tangents
+    """Ground at each distance along a ray, in loops as above; `inside` where no place needs to be held to the grid."""
+    flat, columns = post_m.reshape(post_m.size), np.uint32(post_m.shape[1])
+    size = distance.size
+    south, east, post = bins.places[3][:size], bins.places[4][:size], bins.post[:size]
+    upper, lower = bins.pairs[0][:size], bins.pairs[1][:size]
+    if inside:
         for j in range(size):
-            r, c = along(track, distance[j])
-            row[j], column[j], south[j], east[j] = locate(post_m, r, c)
+            row, column = along(track, distance[j])
+            i, k = np.int32(row), np.int32(column)
+            post[j] = np.uint32(np.uint32(i) * columns) + np.uint32(k)
+            south[j], east[j] = row - i, column - k
+    else:
         for j in range(size):
-            upper[j], lower[j] = corners(post_m, row[j], column[j])
-        for j in range(size):
-            ground[j] = blend(upper[j], lower[j], south[j], east[j])
-        known = size
-    return ground, distance
+            row, column = along(track, distance[j])
+            south_of, east_of, south[j], east[j] = locate(post_m, row, column)
+            post[j] = np.uint32(south_of * columns) + east_of
+    for j in range(size):
+        upper[j], lower[j] = corners(flat, post[j], columns)
+    for j in range(size):
+        ground[j] = blend(upper[j], lower[j], south[j], east[j])
+
+
+@njit(cache=True)
+def _inside(track, far_m, shape):  # type: ignore[no-untyped-def] # typed by tangents
+    """Whether a ray in posts surely stays in the grid: its ends do, by more than it can bend, and its start by more."""
+    bend = far_m**2 * (max(abs(track.lat2), abs(track.lon2)) + max(abs(track.lat3), abs(track.lon3)) * far_m) + 0.001
+    row, column = track.lat0 + track.lat1 * far_m, track.lon0 + track.lon1 * far_m
+    return (
+        (min(row, track.lat0) > bend)
+        & (min(column, track.lon0) > bend)
+        & (max(row, track.lat0) < shape[0] - 1 - bend)
+        & (max(column, track.lon0) < shape[1] - 1 - bend)
+    )
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -162,8 +230,7 @@ def _settle(post_m, track, height_m, ground_m, range_m, tolerance):  # type: ign
     s = _distance(range_m, height_m - ground_m)
     for look in range(MOST_LOOKS):
         r, c = along(track, s)
-        i, j, south, east = locate(post_m, r, c)
-        ground_m = blend(*corners(post_m, i, j), south, east)
+        ground_m = bilinear(post_m, r, c)
         found = _distance(range_m, height_m - ground_m)
         if not abs(found - s) > tolerance:
             break

@@ -23,6 +23,20 @@ class MonitorSettings(BaseModel):
 
     method: Literal["robust", "paper"] = Field("robust", description="which test decides: clipped Q, or T as published")
     p_fa: float = Field(1e-4, gt=0, lt=0.5, description="probability of a false alert in one scan")
+    unmatched_budget: float = Field(
+        0.5, ge=0, le=0.9, description="share of p_fa that goes to the tests of unmatched shadows, half to each thread"
+    )
+    window_scans: int = Field(
+        1, ge=1, le=30, description="scans whose pairs may be gathered where one has too few for a verdict"
+    )
+    alert_scans: int = Field(1, ge=1, le=30, description="scans in a row beyond a threshold that make an alert")
+    clear_scans: int = Field(1, ge=1, le=30, description="scans in a row within the thresholds that end an alert")
+    offset_search_m: float = Field(
+        1200.0,
+        ge=0,
+        le=5000,
+        description="how far to each side a horizontal error is sought that explains an alert; 0: never",
+    )
     p_md: float = Field(
         1e-3, gt=0, lt=1, description="probability of a missed detection that the stated MDB stands for"
     )

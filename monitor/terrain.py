@@ -20,10 +20,13 @@ from rasterio.enums import Resampling
 from rasterio.errors import RasterioError
 from rasterio.vrt import WarpedVRT
 
+from monitor.ceiling import ceilings
+
 MOST_POSTS = 400_000_000  # 1.6 GB; files far apart would fill the memory with nothing
 WGS84 = CRS.from_epsg(4326)
 LOWEST_M, HIGHEST_M = -500.0, 9000.0  # no ground on Earth lies outside
 ALIGNMENT_POSTS = 0.05  # files whose posts miss a common grid by more are refused: resampling is not ours to hide
+NO_CEILING = np.empty((0, 0), np.float32)
 
 
 class TerrainError(ValueError):
@@ -41,6 +44,7 @@ class Grid(NamedTuple):
     west_deg: float
     row_deg: float
     column_deg: float
+    ceiling_m: NDArray[np.float32] = NO_CEILING
 
 
 class Terrain:
@@ -71,7 +75,8 @@ def open_terrain(path_or_paths: str | Path | Sequence[str | Path]) -> Terrain:
     checksum = 0
     for path in paths:
         checksum = zlib.crc32(path.read_bytes(), checksum)
-    return Terrain(_mosaic(tiles, paths), paths, f"{checksum:08x}")
+    grid = _mosaic(tiles, paths)
+    return Terrain(grid._replace(ceiling_m=ceilings(grid.height_m)), paths, f"{checksum:08x}")
 
 
 def _read(path: Path) -> Grid:
@@ -144,8 +149,15 @@ def sample(grid: Grid, latitude_deg: float, longitude_deg: float) -> float:
     """Bilinear height in metres; NaN where one of the four posts is void or the place is outside."""
     row = (grid.north_deg - latitude_deg) / grid.row_deg
     column = (longitude_deg - grid.west_deg) / grid.column_deg
-    i, j, south, east = locate(grid.height_m, row, column)
-    return blend(*corners(grid.height_m, i, j), south, east)
+    return bilinear(grid.height_m, row, column)
+
+
+@njit(cache=True)
+def bilinear(height_m: NDArray[np.float32], row: float, column: float) -> float:
+    """Bilinear height in metres at a place in posts; NaN where one of the four is void or the place is outside."""
+    i, j, south, east = locate(height_m, row, column)
+    columns = np.uint32(height_m.shape[1])
+    return blend(*corners(height_m.reshape(height_m.size), np.uint32(i * columns) + j, columns), south, east)
 
 
 @njit(cache=True)
@@ -167,10 +179,10 @@ def _within(x: float, last: float) -> float:
 
 
 @njit(cache=True)
-def corners(height_m: NDArray[np.float32], i: np.uint32, j: np.uint32) -> tuple[np.complex64, np.complex64]:
-    """Post (i, j) with its neighbour to the east, and those south of them: two numbers to move, not four."""
-    k, m = i + np.uint32(1), j + np.uint32(1)
-    return np.complex64(complex(height_m[i, j], height_m[i, m])), np.complex64(complex(height_m[k, j], height_m[k, m]))
+def corners(flat_m: NDArray[np.float32], k: np.uint32, columns: np.uint32) -> tuple[np.complex64, np.complex64]:
+    """Post k of all with its neighbour to the east, and those south of them: two numbers to move, not four."""
+    one, m = np.uint32(1), k + columns
+    return np.complex64(complex(flat_m[k], flat_m[k + one])), np.complex64(complex(flat_m[m], flat_m[m + one]))
 
 
 @njit(cache=True)

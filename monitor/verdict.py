@@ -9,13 +9,16 @@ OK, ALERT, UNAVAILABLE = "ok", "alert", "unavailable"
 class Verdict:
     """The answer for one scan, and the numbers behind it. Disparities are in range bins.
 
-    `mdb_bins` is the minimum detectable bias of the published test, with the plain rms of the calibration.
+    `scans` is how many scans the pairs are from. `threshold` is that of the method's statistic, Q or N T / sigma^2.
+    `mdb_bins` is the minimum detectable bias of the published test, with the plain rms of the calibration. The limits
+    of the unmatched shares are there with a calibration that has them. `offset_...` is `offset.Offset`, of an alert.
     """
 
     scan: int
     verdict: str
     reasons: tuple[str, ...]
     n_pairs: int
+    scans: int
     t_bins2: float | None
     t_normalised: float | None
     q: float | None
@@ -23,6 +26,12 @@ class Verdict:
     mean_bins: float | None
     mean_stderr_bins: float | None
     unmatched_radar: float | None
+    unmatched_radar_limit: float | None
     unmatched_dem: float | None
+    unmatched_dem_limit: float | None
+    level: float | None
     mdb_bins: float | None
     calibration: str
+    offset_north_m: float | None = None
+    offset_east_m: float | None = None
+    offset_confidence: float | None = None

@@ -20,11 +20,14 @@ STEP_DEG = 3.0  # about a beam width, so that neighbouring radials are nearly in
 CLEARANCE_M = (250.0, 500.0)
 
 
-def draw_legs(base: Scenario, count: int, seed: int, scans: int = 2) -> Iterator[Scenario]:
+def draw_legs(
+    base: Scenario, count: int, seed: int, scans: int = 2, clearance_m: tuple[float, float] = CLEARANCE_M
+) -> Iterator[Scenario]:
     """`count` short flights over the base scenario's terrain: `scans` scans at 3 degrees, each with its own seed.
 
-    Place and heading are uniform over the part of the file from which the radar sees only the file, and the height is
-    250 to 500 m above the highest ground under the leg. Raises ValueError when the file is too small for that.
+    Heading and place are uniform, the place over the part of the file from which the radar sees only the file or, where
+    the world is incomplete, over the middle half of the file. The height is `clearance_m`, uniform between the two,
+    above the highest ground under the leg. Raises ValueError when the file is too small for that.
     """
     rng = np.random.default_rng((seed, count))
     radar = base.radar.model_copy(update={"step_deg": STEP_DEG})
@@ -43,7 +46,7 @@ def draw_legs(base: Scenario, count: int, seed: int, scans: int = 2) -> Iterator
         track = Trajectory(flight, seed).at(np.linspace(0.0, duration, 20))
         quiet = base.world.model_copy(update={"post_noise_m": 0.0})
         ground = dem.sample(quiet, track.latitude_deg[:, None], track.longitude_deg[:, None], seed)
-        height = float(np.nanmax(ground, initial=0.0)) + rng.uniform(*CLEARANCE_M)
+        height = float(np.nanmax(ground, initial=0.0)) + rng.uniform(*clearance_m)
         flight = flight.model_copy(update={"height_m": height})
         yield base.model_copy(update={"flight": flight, "radar": radar, "seed": base.seed + number})
 
@@ -59,7 +62,8 @@ def _safe_bounds(base: Scenario, duration_s: float) -> tuple[float, float, float
     with rasterio.open(base.world.path) as file:
         west, south, east, north = transform_bounds(file.crs, "EPSG:4326", *file.bounds)
     if base.world.incomplete:
-        return west, south, east, north
+        wide, high = (east - west) / 4, (north - south) / 4
+        return west + wide, south + high, east - wide, north - high
     reach = base.radar.range_nm * METRES_PER_NM + REACH_MARGIN_M + base.flight.ground_speed_mps * duration_s
     high = 1.01 * reach / METRES_PER_DEGREE
     wide = high / np.cos(np.radians(max(abs(south), abs(north))))

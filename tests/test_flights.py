@@ -89,6 +89,34 @@ def test_the_demo_calibration_is_named_in_every_verdict_and_holds_for_its_radar(
     assert {scan.verdict.calibration for scan in judged} == {"demo-white-mountains"}
 
 
+def test_an_alert_names_the_shift_that_explains_it_and_no_other_verdict_names_one(tmp_path: Path) -> None:
+    """Half a kilometre to the east and 300 m south, to within the finest step and a post of the terrain."""
+    moved = shift_terrain(WHITE_MOUNTAINS, tmp_path / "moved.tif", east_m=500.0, north_m=-300.0)
+    judged = fly(Flight(low_pass(), moved, P_FA, load_calibration(CALIBRATION)))
+    assert verdicts(judged) == {ALERT}
+    for scan in judged:
+        assert scan.verdict.offset_east_m == pytest.approx(500, abs=100)
+        assert scan.verdict.offset_north_m == pytest.approx(-300, abs=100)
+        assert (scan.verdict.offset_confidence or 0) > 0.9
+    (fine, *_) = fly(Flight(low_pass(), WHITE_MOUNTAINS, P_FA, load_calibration(CALIBRATION)))
+    assert fine.verdict.offset_east_m is None
+
+
+def test_shadows_without_a_partner_alert_where_the_terrain_is_another(shifted: Path) -> None:
+    (scan, *_) = fly(Flight(low_pass(), shifted, P_FA, load_calibration(CALIBRATION)))
+    found = scan.verdict
+    assert found.unmatched_dem is not None
+    assert found.unmatched_dem_limit is not None
+    assert found.unmatched_dem > found.unmatched_dem_limit
+    assert "the unmatched share of terrain shadows" in " ".join(found.reasons)
+
+
+def test_a_radar_of_another_gain_than_calibrated_gives_no_verdict() -> None:
+    judged = fly(Flight(low_pass(Radar(snr_db=6.0)), WHITE_MOUNTAINS, P_FA, load_calibration(CALIBRATION)))
+    assert verdicts(judged) == {UNAVAILABLE}
+    assert all("check the radar's gain" in " ".join(scan.verdict.reasons) for scan in judged)
+
+
 def test_a_calibration_for_another_radar_makes_the_verdict_unavailable() -> None:
     scenario = low_pass(Radar(payload="wxr2100_6bit"), sweeps=1)
     (scan,) = fly(Flight(scenario, WHITE_MOUNTAINS, P_FA, load_calibration(CALIBRATION)))

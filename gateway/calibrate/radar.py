@@ -16,7 +16,8 @@ from gateway.calibrate.page import Histogram
 from gateway.calibrate.recorded import CELLS, LARGEST_SIZES, SHARES_OF_RANGE, Compared, Read
 from gateway.console import utc
 from gateway.errors import GatewayError
-from monitor.calibration import Calibration, fit
+from monitor.calibration import Calibration
+from monitor.fitting import fit
 from monitor.residuals import NORMALITY_TEST, moments, normality
 
 P_FAS = (1e-1, 1e-2, 1e-3)
@@ -87,14 +88,14 @@ def calibration(name: str, reads: Sequence[Read], found: Material, least_scans: 
             f"{other.name} and {reads[0].name} have different monitor settings: give one rack file by -c"
         )
     needed = settings.pairs_needed
-    usable = [k for k, scan in enumerate(found.scans) if len(scan.disparities) >= needed]
+    usable = [k for k, scan in enumerate(found.scans) if len(scan.sample.disparities) >= needed]
     if len(usable) < least_scans:
         raise GatewayError(
             f"{len(usable)} of {len(found.scans)} scans have the {needed} pairs of shadows that a verdict needs, and "
             f"{least_scans} are wanted: {FLY}, for longer, or be content with fewer by --least-scans"
         )
     middle = usable[len(usable) // 2]
-    samples = [scan.disparities for scan in found.scans]
+    samples = [scan.sample for scan in found.scans]
     try:
         return fit(
             samples[:middle],

@@ -3,12 +3,12 @@
 import hashlib
 from collections import Counter
 from dataclasses import dataclass, field
-from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.chunks import blocks
 from gateway.core import Core
 from gateway.errors import GatewayError
 from gateway.pipeline import Pipeline
@@ -17,6 +17,7 @@ from gateway.reprocess.job import RECORDS_AT_ONCE, Job, set_up
 from monitor.comparison import Comparison
 from monitor.integrity import Monitor
 from monitor.residuals import residuals
+from monitor.sample import ScanSample
 from monitor.scans import Scan
 from monitor.settings import MonitorSettings
 from monitor.verdict import Verdict
@@ -27,11 +28,11 @@ CELLS = tuple((share, size) for share in SHARES_OF_RANGE for size in LARGEST_SIZ
 
 
 class Compared(NamedTuple):
-    """A scan of so many bins and range: the disparities (n,) as in flight, and residuals of centres for each cell."""
+    """A scan of so many bins and range: what the tests look at in flight, and residuals of centres for each cell."""
 
     bins: int
     range_nm: float
-    disparities: NDArray[np.float64]
+    sample: ScanSample
     centres: tuple[NDArray[np.float64], ...]
 
 
@@ -69,9 +70,8 @@ def read(job: Job) -> Read:
     core = Core(
         lambda before: Pipeline(config, monitor, watch, before, tells_state=False), lambda _: None, failures.append
     )
-    records = iter(recording)
-    while block := list(islice(records, RECORDS_AT_ONCE)):
-        found.begins_utc_ns = found.begins_utc_ns or block[0].stamp.utc_ns
+    for block in blocks(recording.runs(), RECORDS_AT_ONCE):
+        found.begins_utc_ns = found.begins_utc_ns or block.first.stamp.utc_ns
         core.process_all(block)
     core.finish()
     if failures:
@@ -88,7 +88,7 @@ def _compared(scan: Scan, comparison: Comparison) -> Compared:
         limit = int(share * bins)
         radar, dem = comparison.radar_states[:, :limit], comparison.dem_states[:, :limit]
         centres.append(residuals(radar, dem, (1, size), "overlap").centre)
-    return Compared(bins, scan.range_nm, comparison.disparities, tuple(centres))
+    return Compared(bins, scan.range_nm, comparison.sample(scan), tuple(centres))
 
 
 def _digest(recording: Recording) -> str:

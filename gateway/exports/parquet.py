@@ -63,6 +63,7 @@ VERDICTS = pa.schema(
         ("method", pa.string()),
         ("p_fa", pa.float64()),
         ("n_pairs", pa.int64()),
+        ("scans", pa.int64()),
         *(
             (name, pa.float64())
             for name in (
@@ -73,8 +74,14 @@ VERDICTS = pa.schema(
                 "mean_bins",
                 "mean_stderr_bins",
                 "unmatched_radar",
+                "unmatched_radar_limit",
                 "unmatched_dem",
+                "unmatched_dem_limit",
+                "level",
                 "mdb_bins",
+                "offset_north_m",
+                "offset_east_m",
+                "offset_confidence",
             )
         ),
         ("calibration", pa.string()),

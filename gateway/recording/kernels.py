@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from decoders.kernels_crc import crc32
+from gateway.chunks import BEGIN, DROPPED_BEFORE, END, MONOTONIC_NS, NUMBER, SEQUENCE, UTC_NS
 from gateway.recording.layout import RAW_HEAD
 
 MESSAGE: Final = 5  # the opcode
@@ -21,7 +22,6 @@ RAW_BYTES: Final = RAW_RECORD.itemsize
 BEFORE_LENGTH: Final = 9  # bytes that `length` does not count
 GUARDED: Final = RAW_BYTES - RAW_HEAD.size  # where what the CRC-32 covers begins
 KNOWN: Final = 1 << 32  # of a channel: above the CRC-32 to go on from
-COLUMNS: Final = 7
 CHANNELS: Final = 1 << 16
 
 Int = Any  # of whatever width the loop has
@@ -33,9 +33,8 @@ def raw_records(
 ) -> tuple[int, int]:
     """Take raw records from data[at:] until one is not whole, or not raw, or there is no more room in `columns`.
 
-    `seeds` i8 (65536,) has by channel what its CRCs begin with, and `KNOWN`; 0 of one that is not known. Each column
-    of `columns` u8 (7, n) gets sequence, monotonic_ns, utc_ns, dropped_before, channel, begin and end of a chunk.
-    Gives how many there are, and where it stopped.
+    `seeds` i8 (65536,) has by channel what its CRCs begin with, and `KNOWN`; 0 of one that is not known. `columns` gets
+    what `Chunks` says, channels as the numbers of adapters. Gives how many there are, and where it stopped.
     """
     count = 0
     while count < columns.shape[1] and at + RAW_BYTES <= data.size:
@@ -49,13 +48,13 @@ def raw_records(
         end = at + BEFORE_LENGTH + np.int64(head.length)
         if crc32(data, at + GUARDED, end, seed) != head.crc:
             break
-        columns[0, count] = head.sequence
-        columns[1, count] = head.monotonic_ns
-        columns[2, count] = head.utc_ns
-        columns[3, count] = head.dropped_before
-        columns[4, count] = head.channel
-        columns[5, count] = at + RAW_BYTES
-        columns[6, count] = end
+        columns[SEQUENCE, count] = head.sequence
+        columns[MONOTONIC_NS, count] = head.monotonic_ns
+        columns[UTC_NS, count] = head.utc_ns
+        columns[DROPPED_BEFORE, count] = head.dropped_before
+        columns[NUMBER, count] = head.channel
+        columns[BEGIN, count] = at + RAW_BYTES
+        columns[END, count] = end
         count += 1
         at = end
     return count, at

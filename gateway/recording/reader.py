@@ -7,17 +7,17 @@ given up on cheap signs first, and what may be spent on CRCs there grows with th
 
 import re
 import struct
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from itertools import chain, repeat
-from operator import length_hint
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from gateway.recording.kernels import CHANNELS, COLUMNS, KNOWN, MESSAGE, RAW_BYTES, raw_records
+from gateway.chunks import COLUMNS, MONOTONIC_NS, NUMBER, UTC_NS, Chunks, Run
+from gateway.recording.kernels import CHANNELS, KNOWN, MESSAGE, RAW_BYTES, raw_records
 from gateway.recording.layout import (
     LARGEST_RECORD,
     MAGIC,
@@ -97,10 +97,10 @@ class FileReader:
 
     def records(self) -> Iterator[Record]:
         """Every whole record; damaged places and a torn end go to the findings."""
-        return chain.from_iterable(self._runs())
+        return chain.from_iterable(self.runs())
 
-    def _runs(self) -> Iterator[Iterable[Record]]:
-        """The same in runs, which cost no call for each record."""
+    def runs(self) -> Iterator[Run]:
+        """The same in runs, which cost no object for each record."""
         window, found = self._window, self._found
         before = found.records
         at = len(OPENING) if self.begins_as_ours else self._skip(0, DamagedRecord("no recording begins here"))
@@ -124,21 +124,20 @@ class FileReader:
         if self._tail is not None:
             found.torn.append((self._path, self._torn(found.records - before, window.size - self._tail)))
 
-    def _raw_records(self, at: int) -> Generator[Iterable[Record], None, int]:
+    def _raw_records(self, at: int) -> Generator[Run, None, int]:
         """Raw records as long as they lie whole in the window one behind the other; where that ends."""
-        data, base, new = self._window.data, self._window.base, tuple.__new__
+        data, base = self._window.data, self._window.base
         count, stopped = raw_records(np.frombuffer(data, np.uint8), at - base, self._seeds, self._columns)
-        numbers, monotonic_ns, utc_ns, dropped, channels, begins, ends = self._columns[:, :count].tolist()
-        stamps = map(new, repeat(Stamp), zip(monotonic_ns, utc_ns, strict=True))
-        adapters = map(self._adapters.__getitem__, channels)
-        chunks = map(data.__getitem__, map(slice, begins, ends))
-        left = iter(numbers)
+        if not count:
+            return at
+        columns = self._columns[:, :count].copy()
+        run = Chunks(columns, {number: self._adapters[number] for number in {*columns[NUMBER].tolist()}}, data)
         try:
-            yield map(new, repeat(Raw), zip(left, stamps, adapters, chunks, dropped, strict=True))
+            yield run
         finally:
-            if given := count - length_hint(left):
+            if given := run.given:
                 self._found.records += given
-                self._last = Stamp(monotonic_ns[given - 1], utc_ns[given - 1])
+                self._last = Stamp(*columns[[MONOTONIC_NS, UTC_NS], given - 1].tolist())
         return base + stopped
 
     def _whole(self, at: int) -> tuple[int, Record | None]:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 
+from gateway.chunks import Run
 from gateway.errors import GatewayError
 from gateway.recording.layout import FORMAT_KEY, LAYOUTS, MAGIC
 from gateway.recording.reader import OPENING, Damage, FileReader, Findings
@@ -55,15 +56,23 @@ class Recording:
         """What is to be said of files without their index."""
         return "; ".join(f"{path.name}: {text}" if len(self.files) > 1 else text for path, text in self._found.torn)
 
-    def __iter__(self) -> Iterator[Record]:
+    def runs(self) -> Iterator[Run]:
+        """The same records in runs, raw ones as columns."""
         self._found = found = Findings()
-        return chain.from_iterable(read_file(path, found) for path in self.files)
+        return chain.from_iterable(_runs(path, found) for path in self.files)
+
+    def __iter__(self) -> Iterator[Record]:
+        return chain.from_iterable(self.runs())
 
 
 def read_file(path: Path, found: Findings) -> Iterator[Record]:
     """The records of one file, which need not even be a recording: then all of it is damaged, or torn."""
+    return chain.from_iterable(_runs(path, found))
+
+
+def _runs(path: Path, found: Findings) -> Iterator[Run]:
     with Window(path) as window:
-        yield from FileReader(path, window, found).records()
+        yield from FileReader(path, window, found).runs()
 
 
 def metadata_of(path: Path) -> dict[str, str]:

@@ -4,12 +4,12 @@ import hashlib
 import json
 from collections.abc import Iterable
 from functools import cache, lru_cache
-from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pyarrow as pa
 
+from gateway.chunks import blocks
 from gateway.config import RackConfig
 from gateway.core import Core
 from gateway.errors import GatewayError
@@ -84,10 +84,9 @@ def work(job: Job) -> Outcome:
 
     failures: list[str] = []
     core = Core(lambda before: Pipeline(config, monitor, before=before, tells_state=False), take, failures.append)
-    records = iter(recording)
     first = last = None
-    while block := list(islice(records, RECORDS_AT_ONCE)):
-        first, last = first or block[0].stamp, block[-1].stamp
+    for block in blocks(recording.runs(), RECORDS_AT_ONCE):
+        first, last = first or block.first.stamp, block.last.stamp
         core.process_all(block)
     core.finish()
     whole = {

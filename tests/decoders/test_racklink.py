@@ -8,6 +8,8 @@ from functools import cache
 from itertools import pairwise
 from subprocess import run
 
+import numpy as np
+import numpy.typing as npt
 import pytest
 from cobs import cobs
 from hypothesis import given
@@ -106,6 +108,11 @@ def test_the_stream_of_every_outcome_meets_every_counter() -> None:
     assert all(counters.values())
 
 
+def joined(chunks: list[bytes]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64]]:
+    """Chunks one behind the other, and where each ends."""
+    return np.frombuffer(b"".join(chunks), np.uint8), np.cumsum([len(chunk) for chunk in chunks])
+
+
 @given(st.lists(BODIES, max_size=5), GARBAGE, st.data())
 def test_chunks_framed_many_at_once_are_those_framed_one_by_one(
     bodies: list[bytes], garbage: list[bytes], data: st.DataObject
@@ -115,7 +122,7 @@ def test_chunks_framed_many_at_once_are_those_framed_one_by_one(
     pieces = [stream[a:b] for a, b in pairwise(cuts)]
     one_by_one, at_once = Framer(), Framer()
     fed = [(k, packet) for k, piece in enumerate(pieces) for packet in one_by_one.feed(piece)]
-    framed = at_once.frame(pieces)
+    framed = at_once.frame(*joined(pieces))
     found = [(int(framed.chunk[k]), framed.packet(k)) for k in range(len(framed.header))]
     assert (found, at_once.counters()) == (fed, one_by_one.counters())
 
@@ -152,9 +159,12 @@ def test_a_packet_at_the_end_of_an_overlong_run_comes_with_the_chunk_that_closes
     large = GOOD._replace(body=bytes(range(256)) * 15)
     began = b"\xaa" * 9000 + frame(packet_bytes(large.body, sequence=3))[:-1]
     many, single = Framer(), Framer()
-    many.frame([began])
+    many.frame(*joined([began]))
     single.feed(began)
-    found, expected = many.frame(chunks), [(p, k) for k, chunk in enumerate(chunks) for p in single.feed(chunk)]
+    found, expected = (
+        many.frame(*joined(chunks)),
+        [(p, k) for k, chunk in enumerate(chunks) for p in single.feed(chunk)],
+    )
     assert [(found.packet(k), found.chunk[k]) for k in range(len(found.header))] == expected
     assert many.counters() == single.counters()
     assert many.counters()["oversize"] == 1 and expected[0][0] == large

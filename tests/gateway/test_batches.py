@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from decoders import formats as f
 from decoders.framing import Packets
 from decoders.racklink import Framer, Packet
+from gateway.chunks import Block
 from gateway.config import check_config
 from gateway.link import Link
 from gateway.metadata import build_monitor
@@ -121,7 +122,7 @@ def given(records: list[Record], sizes: list[int], tells_state: bool = True) -> 
     for size in cycle(sizes):
         if at >= len(records):
             break
-        events = made.feed(records[at]) if size == 1 else made.feed_all(records[at : at + size])
+        events = made.feed(records[at]) if size == 1 else made.feed_all(Block.of([records[at : at + size]]))
         lines += [event.to_json() for event in events]
         at += size
     return lines + [event.to_json() for event in made.finish()]
@@ -155,9 +156,9 @@ def test_most_packets_of_a_flight_are_taken_many_at_once(monkeypatch: pytest.Mon
     packets = Counter[str]()
     count_plain, count = Link.count_plain, Link.count
 
-    def many(link: Link, batch: Packets, own: NDArray[np.intp]) -> None:
+    def many(link: Link, batch: Packets, own: NDArray[np.intp], latest_ns: int) -> None:
         packets["many"] += len(own)
-        count_plain(link, batch, own)
+        count_plain(link, batch, own, latest_ns)
 
     def one(link: Link, packet: Packet) -> bool:
         packets["one"] += 1

@@ -23,9 +23,12 @@ from gateway.recording import Recording
 from gateway.replay import replay
 from gateway.reprocess.job import jobs
 from monitor.calibration import load_calibration
+from monitor.integrity import Monitor
 from monitor.monte_carlo import Variables, around, simulate
+from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
 from monitor.terrain import open_terrain
+from monitor.warmup import warm_up
 from simulators.scenario import BUILT_IN_TERRAIN
 from tests.gateway.flown import record_flight
 from tests.gateway.shell import shadebus
@@ -39,6 +42,15 @@ SWEEPS = 3
 def invoke(*arguments: str | Path) -> Result:
     """A verb within this process, which saves its start."""
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled_too() -> None:
+    """What the verbs compile at their first start ever, they must not compile within a test's time."""
+    terrain = open_terrain(MOUNTAINS)
+    warm_up(Monitor(terrain))
+    setup = setup_of(Variables(44.5, -71.5, 900.0), MonitorSettings(), 512, 10.0, 3.0, seed=1)
+    simulate(around(terrain.grid, setup), setup, range(1))
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +98,7 @@ def test_what_is_fitted_is_what_the_verdicts_of_a_replay_rest_on(flights: Path) 
             verdicts.append((event.n_pairs, event.mean_bins))
 
     replay(recording, config, recorded_monitor(recording.metadata, config), take, list[str]().append)
-    found = [(len(scan.disparities), float(np.mean(scan.disparities))) for scan in read(job).scans]
+    found = [(len(scan.sample.disparities), float(np.mean(scan.sample.disparities))) for scan in read(job).scans]
     assert found == verdicts
     assert len(found) == SWEEPS
 
@@ -131,13 +143,13 @@ def made(name: str, begins_utc_ns: int, *scans: Compared, p_fa: float = 1e-4, re
 def scan(value: float, range_nm: float = 10.0) -> Compared:
     """Twenty disparities about a value, which tells one scan from another."""
     d = value + np.tile([-2.0, -1.0, 1.0, 2.0], 5)
-    return Compared(512, range_nm, d, (d,) * len(CELLS))
+    return Compared(512, range_nm, ScanSample(d, Unmatched(2, 10), Unmatched(2, 10), 3.0), (d,) * len(CELLS))
 
 
 def test_the_commonest_radar_setting_is_calibrated_in_order_of_time_and_the_rest_counted() -> None:
     found = material([made("late", 20, scan(3), scan(4)), made("early", 10, scan(1, 20.0), scan(2))])
     assert (found.bins, found.range_nm, found.left_out) == (512, 10.0, 1)
-    assert [float(np.mean(s.disparities)) for s in found.scans] == [2.0, 3.0, 4.0]
+    assert [float(np.mean(s.sample.disparities)) for s in found.scans] == [2.0, 3.0, 4.0]
 
 
 def test_the_first_half_is_fitted_and_the_second_checks_it() -> None:

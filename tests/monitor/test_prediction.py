@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pyproj import Geod, Transformer
 
 from monitor.geodesy import along, curvature_radii, ray
-from monitor.prediction import Beam, Pointing, predict, tangents
+from monitor.prediction import Beam, Pointing, bins_at, predict, tangents
 from monitor.shade import dem_states, shadows
 from monitor.terrain import Grid, Terrain
 from tests.monitor.ground import COLUMNS, LATITUDE, LONGITUDE, distance_m, looking_north, mesa, northward, plain, post_m
@@ -20,7 +20,7 @@ STEEPEST_DEG = 30.0  # a tilt of -16 degrees, the lowest that ARINC 708 can say,
 
 def look(grid: Grid, height_m: float, ranges_m: NDArray[np.float64], k: float) -> NDArray[np.float64]:
     delta = np.empty(ranges_m.size)
-    assert not tangents(grid, LATITUDE, LONGITUDE, height_m, 0.0, ranges_m, k, delta)
+    assert not tangents(grid, LATITUDE, LONGITUDE, height_m, 0.0, bins_at(ranges_m), k, -inf, delta)
     return delta
 
 
@@ -51,7 +51,7 @@ def test_real_ground_is_met_to_a_tenth_of_a_range_bin(
     ranges, elevation = dense_walk(white_mountains, place, azimuth)
     bin_ranges = (np.arange(512, dtype=np.float64) + 0.5) * BIN_M
     delta = np.empty(512)
-    assert not tangents(white_mountains.grid, *place, radians(azimuth), bin_ranges, 1.0, delta)
+    assert not tangents(white_mountains.grid, *place, radians(azimuth), bins_at(bin_ranges), 1.0, -inf, delta)
     farther_before = np.maximum.accumulate(ranges)
     nearer_after = np.minimum.accumulate(ranges[::-1])[::-1]
     ground = ranges * np.exp(1j * elevation)
@@ -85,7 +85,7 @@ def test_every_bin_lies_on_the_ground_however_steeply_the_beam_looks(
     bin_ranges = (np.arange(512, dtype=np.float64) + 0.5) * bin_m
     ranges, elevation = dense_walk(stored, place, azimuth)
     delta = np.empty(512)
-    tangents(stored.grid, *place, radians(azimuth), bin_ranges, 1.0, delta)
+    tangents(stored.grid, *place, radians(azimuth), bins_at(bin_ranges), 1.0, -inf, delta)
     np.testing.assert_array_equal(np.isneginf(delta), bin_ranges <= below_m)
     within = (bin_ranges > below_m) & (bin_ranges < np.nanmax(ranges) - bin_m) & ~np.isnan(delta)
     assert np.count_nonzero(within) > 150
@@ -147,9 +147,9 @@ def test_a_bin_is_found_though_its_first_guess_lies_beyond_the_last_post() -> No
     range_m = float(np.hypot(guess_m, 100))
     assert np.sqrt(range_m**2 - 500**2) == pytest.approx(ground_m, abs=1)
     delta = np.empty(1)
-    assert not tangents(grid, LATITUDE, LONGITUDE, 500.0, 0.0, np.array([range_m]), inf, delta)
+    assert not tangents(grid, LATITUDE, LONGITUDE, 500.0, 0.0, bins_at(np.array([range_m])), inf, -inf, delta)
     assert delta[0] == pytest.approx(-500 / np.sqrt(range_m**2 - 500**2), rel=1e-12)
-    assert tangents(grid, LATITUDE, LONGITUDE, 500.0, 0.0, np.array([range_m + 15]), inf, delta)
+    assert tangents(grid, LATITUDE, LONGITUDE, 500.0, 0.0, bins_at(np.array([range_m + 15])), inf, -inf, delta)
 
 
 def test_the_drop_at_10_nautical_miles_is_20_metres_with_standard_refraction() -> None:

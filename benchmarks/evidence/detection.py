@@ -1,0 +1,93 @@
+"""How often each fault is found, how soon, and by which test."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import ndtri
+
+from benchmarks.evidence.faults import FAULTS, NONE, SCAN_S
+from benchmarks.evidence.flown import Flown
+from benchmarks.evidence.tables import share, table
+from monitor.calibration import Calibration
+from monitor.decision import Findings, examine
+from monitor.disparity import minimum_detectable_bias
+from monitor.sample import ScanSample
+from monitor.settings import MonitorSettings
+
+P_FA = 1e-4
+ENOUGH_PAIRS = 20
+WITHIN = 2  # scans
+BIN_M = 10 * 1852 / 512
+PAIRS = ((20, 30), (30, 45), (45, 62))
+SHIFTS_M = (50, 100, 200, 500)
+WAYS = ("T as published", "Q", "unmatched", "mean", "default")
+
+
+def _by_test(scan: ScanSample, calibration: Calibration) -> dict[str, bool]:
+    """What each test alone, at the whole P_FA, and the default say."""
+    paper = examine(scan, MonitorSettings(p_fa=P_FA, method="paper"), calibration)
+    alone = examine(scan, MonitorSettings(p_fa=P_FA, unmatched_budget=0.0), calibration)
+    shares = examine(scan, MonitorSettings(p_fa=P_FA, unmatched_budget=0.9), calibration)
+    default = examine(scan, MonitorSettings(p_fa=P_FA), calibration)
+    unmatched = [test for test in (shares.unmatched_radar, shares.unmatched_dem) if test]
+    verdicts = (
+        bool(paper.alerts),
+        _statistic(alone),
+        any(test.exceeded for test in unmatched),
+        _mean(scan, calibration),
+        bool(default.alerts),
+    )
+    return dict(zip(WAYS, verdicts, strict=True))
+
+
+def _statistic(found: Findings) -> bool:
+    return found.statistic is not None and found.statistic.exceeded
+
+
+def _mean(scan: ScanSample, calibration: Calibration) -> bool:
+    """The mean against its own standard error, two-sided."""
+    d = scan.disparities
+    if len(d) < ENOUGH_PAIRS:
+        return False
+    error = float(np.std(d, ddof=1)) / math.sqrt(len(d))
+    return abs(float(np.mean(d)) - calibration.median_bins) > float(ndtri(1 - P_FA / 2)) * error
+
+
+def by_fault(flown: Sequence[Flown], calibrations: dict[str, Calibration]) -> str:
+    """A row for each fault: the share of flights found within two scans by each test, and when the default finds it."""
+    rows = []
+    for fault in FAULTS:
+        enough = [
+            flight
+            for flight in flown
+            if max(len(scan.disparities) for scan in flight.samples[NONE.name][:WITHIN]) >= ENOUGH_PAIRS
+        ]
+        said = [
+            [_by_test(scan, calibrations[flight.kind.terrain]) for scan in flight.samples[fault.name]]
+            for flight in enough
+        ]
+        shares = [sum(any(scan[way] for scan in scans[:WITHIN]) for scans in said) for way in WAYS]
+        first = [next((k for k, scan in enumerate(scans) if scan["default"]), None) for scans in said]
+        found = sorted(k for k in first if k is not None)
+        soon = f"{SCAN_S * (found[len(found) // 2] + 1):.0f} s" if found else ""
+        rows.append([fault.name.removesuffix(" 0"), *(share(count, len(said)) for count in shares), soon])
+    return table(["fault", *WAYS, "median time to alert"], rows)
+
+
+def by_pairs(flown: Sequence[Flown], calibrations: dict[str, Calibration]) -> str:
+    """Single scans over shifted terrain by the number of pairs, beside the minimum detectable bias."""
+    rows = []
+    for low, high in PAIRS:
+        cells = []
+        for shift in SHIFTS_M:
+            scans = [
+                (scan, calibrations[flight.kind.terrain])
+                for flight in flown
+                for scan in flight.samples[f"terrain shifted {shift} m"]
+                if low <= len(scan.disparities) < high
+            ]
+            cells.append(share(sum(_by_test(scan, c)["default"] for scan, c in scans), len(scans)))
+        mdb = minimum_detectable_bias((low + high) // 2, next(iter(calibrations.values())).rms_bins, P_FA, 1e-3)
+        rows.append([f"{low} to {high - 1}", *cells, f"{mdb:.1f} bins, {mdb * BIN_M:.0f} m"])
+    return table(["N_D of the scan", *(f"{shift} m" for shift in SHIFTS_M), "MDB of T"], rows)

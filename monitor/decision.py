@@ -1,0 +1,96 @@
+"""The tests of one sample, each with its share of the probability of a false alert.
+
+The statistic, T as published or the robust Q, looks at the disparities of pairs. The unmatched shares look at shadows
+without a partner, so they see what is too far off to pair, and may alert where there are too few pairs for the
+statistic. Their shares scatter more than a binomial would, since shadows of a scan stand or fall together: the
+threshold is a quantile of the beta distribution with the mean m that calibration found and the variance
+m (1 - m) (1 / n + rho).
+"""
+
+from dataclasses import dataclass
+
+from scipy.special import betaincinv
+
+from monitor.calibration import Calibration, UnmatchedModel
+from monitor.disparity import minimum_detectable_bias, normalised, robust_statistic, robust_threshold, threshold
+from monitor.sample import ScanSample, Unmatched
+from monitor.settings import MonitorSettings
+
+RADAR_SHARE, DEM_SHARE = "the unmatched share of radar shadows", "the unmatched share of terrain shadows"
+
+
+@dataclass(frozen=True)
+class Test:
+    """A measured value and what it may reach when nothing is wrong."""
+
+    name: str
+    value: float
+    limit: float
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether something is wrong."""
+        return self.value > self.limit
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.value:.4g} exceeds {self.limit:.4g}"
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The tests that a sample allows, and the numbers behind them.
+
+    Without the statistic `blind` says why, and no sample is ok; what the numbers of the published test are is told with
+    either method.
+    """
+
+    statistic: Test | None = None
+    blind: str = ""
+    unmatched_radar: Test | None = None
+    unmatched_dem: Test | None = None
+    t_normalised: float | None = None
+    q: float | None = None
+    mdb_bins: float | None = None
+
+    @property
+    def alerts(self) -> list[Test]:
+        """The tests that found something wrong."""
+        return [test for test in (self.statistic, self.unmatched_radar, self.unmatched_dem) if test and test.exceeded]
+
+
+def examine(sample: ScanSample, settings: MonitorSettings, calibration: Calibration) -> Findings:
+    """Put a sample to every test that it and the calibration allow."""
+    d, c = sample.disparities, calibration
+    radar_model, dem_model = (c.unmatched_radar, c.unmatched_dem) if settings.method == "robust" else (None, None)
+    each = settings.p_fa * settings.unmatched_budget / 2
+    radar = _unmatched(RADAR_SHARE, sample.unmatched_radar, radar_model, each)
+    dem = _unmatched(DEM_SHARE, sample.unmatched_dem, dem_model, each)
+    p_fa = settings.p_fa - each * sum(model is not None for model in (radar_model, dem_model))
+    if len(d) < settings.pairs_needed:
+        return Findings(None, f"{len(d)} pairs of shadows, {settings.pairs_needed} needed", radar, dem)
+    q = robust_statistic(d, c.median_bins, c.clip_bins, c.sigma_bins)
+    t = normalised(d, c.rms_bins)
+    if settings.method == "robust":
+        test = Test("Q", q, robust_threshold(len(d), p_fa, c.variance_factor))
+        most = len(d) * (c.clip_bins / c.sigma_bins) ** 2  # what Q comes to if every pair is clipped
+        if most <= test.limit:
+            blind = f"Q reaches {most:.1f} at most, its threshold is {test.limit:.1f}"
+            return Findings(None, f"{len(d)} pairs cannot alert at P_FA {p_fa:g}: {blind}", radar, dem)
+    else:
+        test = Test("N T / sigma^2", t, threshold(len(d), p_fa))
+    return Findings(test, "", radar, dem, t, q, minimum_detectable_bias(len(d), c.rms_bins, p_fa, settings.p_md))
+
+
+def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> float:
+    """The share that so many eligible shadows exceed with probability `p_fa` when nothing is wrong."""
+    spread = 1 / eligible + model.overdispersion  # as a share of the variance that a share could have at most
+    weight = 1 / spread - 1
+    if weight <= 0:
+        return 1.0
+    return float(betaincinv(model.mean * weight, (1 - model.mean) * weight, 1 - p_fa))
+
+
+def _unmatched(name: str, found: Unmatched, model: UnmatchedModel | None, p_fa: float) -> Test | None:
+    if model is None or not p_fa or found.share is None:
+        return None
+    return Test(name, found.share, unmatched_threshold(found.eligible, model, p_fa))

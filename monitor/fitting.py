@@ -1,0 +1,92 @@
+"""A calibration from fault-free scans: half of them fit, the other half check.
+
+The fit follows from the heavy tails of real terrain: the median m, a robust spread r (normalised median absolute
+deviation), the clip at +-k r, the root mean square sigma of what the clip leaves, and the variance factor
+c = E[(Q - N)^2] / E[2 N], which is 1 for independent normal disparities and grows with errors common to a scan.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from monitor.calibration import CLIP_FACTOR, Calibration, CheckedRate, LevelLimits, UnmatchedModel
+from monitor.decision import examine
+from monitor.disparity import clipped, robust_statistic
+from monitor.sample import ScanSample, Unmatched
+from monitor.settings import MonitorSettings
+
+QUARTILE = float(ndtri(0.75))  # of a normal distribution: half of it lies nearer to its median
+LEVELS_LEFT_OUT = 0.5  # percent of the scans at either end
+
+
+def fit(
+    scans: Sequence[ScanSample],
+    check: Sequence[ScanSample],
+    p_fas: Sequence[float],
+    minimum_pairs: int,
+    *,
+    name: str,
+    provenance: str,
+    bins: int | None = None,
+    range_nm: float | None = None,
+) -> Calibration:
+    """Fit to fault-free scans, and count on other scans how often each P_FA would have alerted.
+
+    Scans with fewer than `minimum_pairs` are left out, as in flight. Raises ValueError if too few are left.
+    """
+    usable = [scan for scan in scans if len(scan.disparities) >= minimum_pairs]
+    if len(usable) < 2:
+        raise ValueError(
+            f"only {len(usable)} scans have {minimum_pairs} pairs: fly longer, lower or over rougher terrain"
+        )
+    pooled = np.concatenate([scan.disparities for scan in usable])
+    median = float(np.median(pooled))
+    spread = float(np.median(np.abs(pooled - median)) / QUARTILE)
+    if not spread:
+        raise ValueError("half of the disparities are equal, so they have no spread: fit to a radar with its noise")
+    sigma = float(np.sqrt(np.mean(clipped(pooled, median, CLIP_FACTOR * spread) ** 2)))
+    q = np.array([robust_statistic(scan.disparities, median, CLIP_FACTOR * spread, sigma) for scan in usable])
+    n = np.array([len(scan.disparities) for scan in usable])
+    made = Calibration(
+        name=name,
+        provenance=provenance,
+        bins=bins,
+        range_nm=range_nm,
+        median_bins=median,
+        spread_bins=spread,
+        sigma_bins=sigma,
+        rms_bins=float(np.sqrt(np.mean(pooled**2))),
+        variance_factor=max(1.0, float(np.mean((q - n) ** 2) / np.mean(2 * n))),
+        unmatched_radar=_shares([scan.unmatched_radar for scan in usable]),
+        unmatched_dem=_shares([scan.unmatched_dem for scan in usable]),
+        level=_levels(np.array([scan.level for scan in usable])),
+    )
+    held_out = [scan for scan in check if len(scan.disparities) >= minimum_pairs]
+    return made.model_copy(update={"checked": tuple(_checked(held_out, made, p_fa, minimum_pairs) for p_fa in p_fas)})
+
+
+def _checked(scans: Sequence[ScanSample], made: Calibration, p_fa: float, minimum_pairs: int) -> CheckedRate:
+    settings = MonitorSettings(p_fa=p_fa, minimum_pairs=minimum_pairs)
+    alerts = sum(bool(examine(scan, settings, made).alerts) for scan in scans)
+    return CheckedRate(p_fa=p_fa, scans=len(scans), alerts=alerts)
+
+
+def _shares(found: Sequence[Unmatched]) -> UnmatchedModel | None:
+    """The mean share over scans, and by how much its variance exceeds a binomial's."""
+    eligible = np.array([one.eligible for one in found])
+    share = np.array([one.alone for one in found])[eligible > 0] / eligible[eligible > 0]
+    if share.size < 2 or not 0 < share.mean() < 1:
+        return None
+    mean = float(share.mean())
+    excess = (share - mean) ** 2 / (mean * (1 - mean)) - 1 / eligible[eligible > 0]
+    return UnmatchedModel(mean=mean, overdispersion=float(np.clip(excess.mean(), 0, 1)))
+
+
+def _levels(levels: NDArray[np.float64]) -> LevelLimits | None:
+    known = levels[~np.isnan(levels)]
+    if not known.size:
+        return None
+    lowest, highest = np.percentile(known, [LEVELS_LEFT_OUT, 100 - LEVELS_LEFT_OUT])
+    return LevelLimits(lowest=float(lowest), highest=float(highest))

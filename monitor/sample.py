@@ -1,0 +1,55 @@
+"""What the tests of the monitor look at, of one scan or of several together."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Unmatched(NamedTuple):
+    """Shadows of one thread that have no partner in the other, of those that could have one."""
+
+    alone: int
+    eligible: int
+
+    @property
+    def share(self) -> float | None:
+        """From 0 to 1, or None without any eligible one."""
+        return self.alone / self.eligible if self.eligible else None
+
+
+class ScanSample(NamedTuple):
+    """Disparities (N,) of eq. (6) in range bins, the unmatched shadows of either thread, and the signal level."""
+
+    disparities: NDArray[np.float64]
+    unmatched_radar: Unmatched
+    unmatched_dem: Unmatched
+    level: float  # of `signal_level`, NaN where nothing is lit
+
+
+NOTHING = ScanSample(np.empty(0), Unmatched(0, 0), Unmatched(0, 0), float("nan"))
+
+
+def together(samples: Sequence[ScanSample]) -> ScanSample:
+    """Several scans, at least one, as if they were one; the signal level is that of the first."""
+    return ScanSample(
+        np.concatenate([sample.disparities for sample in samples]),
+        _sum([sample.unmatched_radar for sample in samples]),
+        _sum([sample.unmatched_dem for sample in samples]),
+        samples[0].level,
+    )
+
+
+def signal_level(bins: NDArray[np.uint8]) -> float:
+    """The mean level of what is lit in the farther half of the range bins (n, M); NaN where nothing is.
+
+    Near ground fills a radar's highest level whatever its gain is; far ground shows a change of gain or of noise.
+    """
+    far = bins[:, bins.shape[1] // 2 :]
+    lit = np.count_nonzero(far)
+    return float(far.sum(dtype=np.int64) / lit) if lit else float("nan")
+
+
+def _sum(parts: Sequence[Unmatched]) -> Unmatched:
+    return Unmatched(sum(part[0] for part in parts), sum(part[1] for part in parts))

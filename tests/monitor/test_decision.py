@@ -1,0 +1,90 @@
+"""The tests of a sample, each against what it may reach."""
+
+import numpy as np
+import pytest
+from scipy.stats import betabinom, chi2
+
+from monitor.calibration import Calibration, UnmatchedModel
+from monitor.decision import DEM_SHARE, RADAR_SHARE, examine, unmatched_threshold
+from monitor.sample import ScanSample, Unmatched
+from monitor.settings import MonitorSettings
+
+MODEL = UnmatchedModel(mean=0.3, overdispersion=0.02)
+CALIBRATION = Calibration(
+    name="made",
+    provenance="made up",
+    median_bins=0.0,
+    spread_bins=2.0,
+    sigma_bins=2.0,
+    rms_bins=4.0,
+    variance_factor=1.0,
+    unmatched_radar=MODEL,
+    unmatched_dem=MODEL,
+)
+BARE = CALIBRATION.model_copy(update={"unmatched_radar": None, "unmatched_dem": None})
+FEW, MANY = Unmatched(10, 50), Unmatched(45, 50)
+
+
+def sample(n: int = 40, d: float = 1.0, radar: Unmatched = FEW, dem: Unmatched = FEW) -> ScanSample:
+    return ScanSample(np.full(n, d), radar, dem, 2.0)
+
+
+@pytest.mark.parametrize("eligible", [20, 60, 200])
+@pytest.mark.parametrize("p_fa", [1e-2, 1e-4])
+def test_the_threshold_of_a_share_is_that_of_a_beta_binomial(eligible: int, p_fa: float) -> None:
+    """A beta-binomial of the same mean and variance exceeds it as often, but for its steps."""
+    rho = (MODEL.overdispersion + 1 / eligible - 1 / eligible) * eligible / (eligible - 1)
+    weight = 1 / rho - 1
+    other = betabinom(eligible, MODEL.mean * weight, (1 - MODEL.mean) * weight)
+    limit = unmatched_threshold(eligible, MODEL, p_fa)
+    assert 0.2 * p_fa < other.sf(np.floor(limit * eligible)) < 2 * p_fa
+
+
+def test_a_share_of_few_shadows_cannot_exceed_its_threshold() -> None:
+    assert unmatched_threshold(1, MODEL, 1e-3) == 1.0
+
+
+def test_the_probability_of_a_false_alert_is_split_among_the_tests() -> None:
+    settings = MonitorSettings(p_fa=1e-3, unmatched_budget=0.4)
+    found = examine(sample(), settings, CALIBRATION)
+    assert found.statistic is not None
+    assert found.unmatched_radar is not None
+    assert found.statistic.limit == pytest.approx(chi2.isf(0.6e-3, 40))
+    assert found.unmatched_radar.limit == unmatched_threshold(50, MODEL, 0.2e-3)
+
+
+@pytest.mark.parametrize(
+    ("settings", "calibration"),
+    [
+        (MonitorSettings(p_fa=1e-3, method="paper"), CALIBRATION),
+        (MonitorSettings(p_fa=1e-3), BARE),
+        (MonitorSettings(p_fa=1e-3, unmatched_budget=0), CALIBRATION),
+    ],
+)
+def test_the_statistic_has_it_all_where_it_is_the_only_test(
+    settings: MonitorSettings, calibration: Calibration
+) -> None:
+    found = examine(sample(dem=MANY), settings, calibration)
+    assert found.statistic is not None
+    assert found.statistic.limit == pytest.approx(chi2.isf(1e-3, 40))
+    assert not found.alerts
+
+
+def test_unmatched_shadows_alert_alone_where_there_are_too_few_pairs_for_the_statistic() -> None:
+    settings = MonitorSettings(p_fa=1e-3)
+    found = examine(sample(n=3, radar=MANY), settings, CALIBRATION)
+    assert found.statistic is None
+    assert found.blind == "3 pairs of shadows, 16 needed"
+    assert [test.name for test in found.alerts] == [RADAR_SHARE]
+    assert [test.name for test in examine(sample(dem=MANY), settings, CALIBRATION).alerts] == [DEM_SHARE]
+    assert str(found.alerts[0]).startswith("the unmatched share of radar shadows 0.9 exceeds 0.")
+
+
+def test_q_and_t_are_both_told_whatever_decides() -> None:
+    """Forty pairs, three bins apart: Q = 40 9 / 4 and N T / sigma^2 = 40 9 / 16."""
+    found = examine(sample(d=3.0), MonitorSettings(p_fa=1e-3), BARE)
+    assert (found.q, found.t_normalised) == (90.0, 22.5)
+    assert [test.value for test in found.alerts] == [90.0]
+    paper = examine(sample(d=3.0), MonitorSettings(p_fa=1e-3, method="paper"), BARE)
+    assert paper.statistic is not None
+    assert (paper.statistic.value, paper.q, paper.alerts) == (22.5, 90.0, [])
