@@ -28,7 +28,7 @@ CELLS = tuple((share, size) for share in SHARES_OF_RANGE for size in LARGEST_SIZ
 
 
 class Compared(NamedTuple):
-    """A scan of so many bins and range: what the tests look at in flight, and residuals for each cell."""
+    """A scan of so many bins and range: what the tests look at in flight, and residuals of centres for each cell."""
 
     bins: int
     range_nm: float
