@@ -18,7 +18,7 @@ from gateway.recording.keeper import NAME, Keeper
 from gateway.records import Raw
 from gateway.supervision import Supervisor
 from gateway.threads import GuardedThread
-from gateway.warmup import compiling, warm_up_words
+from gateway.warmup import warm_up_words
 from monitor.integrity import Monitor
 from monitor.warmup import warm_up
 
@@ -44,10 +44,9 @@ class Service:
         self._core = core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, self._core_failed)
 
         def core_work() -> None:
-            with compiling():  # the journal records meanwhile
-                warm_up_words()
-                if monitor:
-                    warm_up(monitor)
+            warm_up_words()  # the journal records meanwhile
+            if monitor:
+                warm_up(monitor)
             self._to_core.run(core)
 
         self._supervisors = [

@@ -1,9 +1,5 @@
 """Load the compiled kernels of the way from bytes to words before the first bytes need them."""
 
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import numpy as np
 
 from decoders.arinc429 import decode
@@ -18,16 +14,6 @@ from monitor.scans import SweepWatch
 COARSE, FINE = 0o110, 0o120  # halves of a latitude, which are joined
 NORMAL = 3  # SSM
 LATER_NS = 2_000_000_000  # so that the bus has a second that is over
-
-
-@contextmanager
-def compiling() -> Iterator[None]:
-    """Without looking for garbage: what the compiler makes stays, and to look through it again and again takes long."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
 
 
 def warm_up_words() -> None:
