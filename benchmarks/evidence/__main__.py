@@ -46,10 +46,10 @@ def main() -> None:
         "standard deviation of the ground within a square of 10 km. Over the Sierra tile, 33 km wide, many radials\n"
         "leave the terrain, and count against it here.\n\n" + availability.page(fault_free, calibrations),
         "## The terrain thread's own errors\n\n"
-        f"As in the paper's Table 5: {terrain_thread.RUNS} runs of 360 radials with Table 4's errors and posts wrong by "
-        "3 m, its radar and\nboresight, in bins of 144.8 m, over the middle of each tile; with its pairing of first "
-        "shadows and by overlap. Where\neq. (11), which takes edges to be independent, differs from the centre's sigma, "
-        "they are not.\n\n" + terrain_thread.page(),
+        f"As in the paper's Table 5: {terrain_thread.RUNS} runs of 360 radials with Table 4's errors and posts wrong "
+        "by 3 m, its radar and\nboresight, in bins of 144.8 m, over the middle of each tile; with its pairing of first "
+        "shadows and by overlap. Where\neq. (11), which takes edges to be independent, differs from the centre's "
+        "sigma, they are not.\n\n" + terrain_thread.page(),
         "## Beside programs of others\n\n" + agreement.report(),
     ]
     PAGE.write_text("\n\n".join(part.strip() for part in parts) + "\n")

@@ -1,4 +1,4 @@
-"""The terrain thread's own errors by altitude, with the paper's pairing and by overlap, and what eq. (11) makes of them."""
+"""The terrain thread's own errors by altitude, by either pairing, and what eq. (11) makes of them."""
 
 from benchmarks.evidence.flown import TERRAINS
 from benchmarks.evidence.tables import table
