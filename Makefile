@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test rig-test lint bench evidence integrity sensitivity latency load full-load hours soak crash agreement cold-start
+.PHONY: demo test rig-test lint bench evidence latency load full-load hours soak crash agreement cold-start
 .PHONY: rebaseline calibration dbc setup lock clean
 
 demo: $(READY)
@@ -29,14 +29,6 @@ bench: $(READY)
 # What the monitor's numbers are worth, into docs/evidence.md; half an hour on two cores.
 evidence: $(READY)
 	$(BIN)/python -m benchmarks.evidence
-
-# Rates of false and true alerts on flights that nothing was tuned on; a few minutes on two cores.
-integrity: $(READY)
-	$(BIN)/python -m benchmarks.integrity
-
-# Which errors of terrain and heading alert, and how often; a few minutes on two cores.
-sensitivity: $(READY)
-	$(BIN)/python -m benchmarks.sensitivity
 
 # Time from a full scan on the line to its verdict, at real bus rates.
 latency: $(READY)
@@ -74,7 +66,7 @@ agreement: $(READY)
 cold-start: $(READY)
 	$(BIN)/python -m benchmarks.cold_start
 
-# The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
+# The demo radar's calibration file, from flights that neither the demo nor `make evidence` uses.
 calibration: $(READY)
 	$(BIN)/python -m benchmarks.calibrate_demo
 

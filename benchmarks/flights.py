@@ -1,6 +1,6 @@
 """Simulated flights through the decoders and the monitor, byte for byte, as fast as they compute."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import islice
@@ -14,13 +14,12 @@ from monitor.calibration import Calibration
 from monitor.comparison import Comparison
 from monitor.sample import NOTHING, ScanSample
 from monitor.scans import Scan
-from monitor.verdict import ALERT, Verdict
+from monitor.verdict import Verdict
 from simulators.carriers import stream
 from simulators.link import units
 from simulators.scenario import Scenario
 
 BATCH = 64
-ENOUGH_PAIRS = 20
 
 
 @dataclass(frozen=True)
@@ -71,9 +70,3 @@ def fly_all(flights: Iterable[Flight]) -> Iterator[list[Judged]]:
     with ProcessPoolExecutor() as pool:
         while batch := list(islice(flights, BATCH)):
             yield from pool.map(fly, batch)
-
-
-def detections(flown: Sequence[Sequence[Judged]]) -> tuple[int, int]:
-    """How many legs alert within two scans, and of how many: those with enough pairs in either scan."""
-    enough = [scans for scans in flown if max(scan.verdict.n_pairs for scan in scans[:2]) >= ENOUGH_PAIRS]
-    return sum(any(scan.verdict.verdict == ALERT for scan in scans[:2]) for scans in enough), len(enough)

@@ -63,15 +63,17 @@ class Calibration(BaseModel):
     def mismatch(self, bins: int, range_nm: float) -> str | None:
         """Why the calibration does not hold for a scan, or None."""
         if self.bins not in (None, bins):
-            return f"calibration {self.name} is for {self.bins} range bins, the radar sends {bins}"
+            return f"calibration {self.name} is for {self.bins} range bins, the radar sends {bins}: {MEND}"
         if self.range_nm not in (None, range_nm):
             return (
-                f"calibration {self.name} is for a range of {self.range_nm:g} NM, the radar is set to {range_nm:g} NM"
+                f"calibration {self.name} is for a range of {self.range_nm:g} NM, the radar is set to {range_nm:g} NM: "
+                f"{MEND}"
             )
         return None
 
 
 NO_CALIBRATION = "none"
+MEND = "load one that was made for it, or none"
 
 _DEFAULTS = Calibration(
     name=NO_CALIBRATION,

@@ -57,7 +57,7 @@ def compare(
     s, bins = settings, scan.bins.shape[1]
     bin_width_m = scan.range_nm * NM_M / bins
     limit = bins if s.range_limit_nm is None else max(1, min(bins, int(bins * s.range_limit_nm / scan.range_nm)))
-    beam = Beam(s.beam_width_deg, s.azimuth_fan, s.azimuth_span, s.refraction_k, s.range_reference)
+    beam = Beam.of(s)
     dem, void = predict(terrain.grid, pointing, limit, bin_width_m, beam)
     dem, radials = dem[~void], radials[~void]
     angles, echoes = scan.scan_angle_deg[radials], scan.bins[radials, :limit]

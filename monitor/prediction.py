@@ -7,7 +7,7 @@ the horizontal distance below the line where eq. (5) writes the slant range, sin
 """
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numba import njit
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from monitor.ceiling import clear_m
 from monitor.geodesy import Ray, along, curvature_radii, ray
+from monitor.settings import MonitorSettings
 from monitor.shade import DEM_INITIAL, walk
 from monitor.terrain import Grid, bilinear, blend, corners, locate, sample
 
@@ -32,6 +33,12 @@ class Beam(NamedTuple):
     azimuth_span: float = 0.75  # beam widths each side, where the two-way gain is 13.5 dB down
     refraction_k: float = 4 / 3  # effective Earth radius factor; inf is the paper's flat Earth
     range_reference: str = "centre"  # or "far_edge", the paper's R_j = j dR
+
+    @classmethod
+    def of(cls, settings: MonitorSettings) -> Self:
+        """The beam that the settings describe."""
+        s = settings
+        return cls(s.beam_width_deg, s.azimuth_fan, s.azimuth_span, s.refraction_k, s.range_reference)
 
 
 class Pointing(NamedTuple):

@@ -103,7 +103,7 @@ def setup_of(true: Variables, s: MonitorSettings, bins: int, range_nm: float, po
         post_noise_m,
         bins,
         range_nm * NM_M / bins,
-        Beam(s.beam_width_deg, s.azimuth_fan, s.azimuth_span, s.refraction_k, s.range_reference),
+        Beam.of(s),
         (s.minimum_size, s.maximum_size or bins),
         "overlap",
         seed,
