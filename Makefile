@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test rig-test lint bench evidence integrity sensitivity latency load full-load hours soak crash agreement cold-start
+.PHONY: demo test rig-test lint bench evidence integrity sensitivity latency load full-load hours soak crash agreement cold-start wide-terrain
 .PHONY: rebaseline calibration dbc setup lock clean
 
 demo: $(READY)
@@ -73,6 +73,10 @@ agreement: $(READY)
 # How soon the gateway answers after its start, with compiled kernels kept and without.
 cold-start: $(READY)
 	$(BIN)/python -m benchmarks.cold_start
+
+# A hundred tiles of an arc-second, 10 x 10 degrees: opening, scans along a track, peak memory.
+wide-terrain: $(READY)
+	$(BIN)/python -m benchmarks.wide_terrain
 
 # The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
 calibration: $(READY)

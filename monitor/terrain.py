@@ -94,12 +94,13 @@ class Terrain:
 class WideTerrain(Terrain):
     """Stored terrain of which only pieces are in memory: those last used, up to `KEPT_POSTS`, or one larger one.
 
+    `pieces` are those, the last used at the end.
     What it says raises TerrainError, naming the file and the mend, where one cannot be read any more.
     """
 
     def __init__(self, files: TerrainFiles, checksum: str) -> None:
         self._files = files
-        self._pieces: OrderedDict[Part, Terrain] = OrderedDict()  # the last used at the end
+        self.pieces: OrderedDict[Part, Terrain] = OrderedDict()  # the last used at the end
         self.extent = Extent.of(*files.whole)
         self.paths = files.paths
         self.checksum = checksum
@@ -127,8 +128,8 @@ class WideTerrain(Terrain):
         return self._piece(Part(top, left, bottom, right))
 
     def _piece(self, part: Part) -> Terrain:
-        piece = self._pieces.pop(part, None) or self._read(part)
-        self._pieces[part] = piece
+        piece = self.pieces.pop(part, None) or self._read(part)
+        self.pieces[part] = piece
         return piece
 
     def _read(self, part: Part) -> Terrain:
@@ -138,8 +139,8 @@ class WideTerrain(Terrain):
                 f"the terrain that is needed at once spans {rows} x {columns} posts, more than there is memory for "
                 f"({MOST_POSTS}): choose a shorter range, or terrain with fewer posts to a degree"
             )
-        while self._pieces and self.held_posts + rows * columns > KEPT_POSTS:
-            self._pieces.popitem(last=False)
+        while self.pieces and self.held_posts + rows * columns > KEPT_POSTS:
+            self.pieces.popitem(last=False)
         _, _, north_deg, west_deg, row_deg, column_deg = self._files.whole
         height_m = self._files.heights_m(part)
         corner = north_deg - part.top * row_deg, west_deg + part.left * column_deg
@@ -148,7 +149,7 @@ class WideTerrain(Terrain):
     @property
     def held_posts(self) -> int:
         """How many posts are in memory."""
-        return sum(piece.grid.height_m.size for piece in self._pieces.values())
+        return sum(piece.grid.height_m.size for piece in self.pieces.values())
 
     def _elevation(self, lat: NDArray[np.float64], lon: NDArray[np.float64]) -> NDArray[np.float64]:
         out = np.full(lat.size, np.nan)

@@ -72,7 +72,7 @@ def places(seed: int, count: int) -> tuple[NDArray[np.float64], NDArray[np.float
     return rng.uniform(SOUTH - 0.1, SOUTH + SIDE + 0.1, count), rng.uniform(WEST - 0.1, WEST + SIDE + 0.1, count)
 
 
-def test_elevations_are_those_of_the_whole_on_the_borders_of_tiles_and_pieces_too(
+def test_elevations_are_those_of_the_whole_on_the_borders_of_tiles_andpieces_too(
     binary: list[Path], wide: Wide
 ) -> None:
     on_borders = np.meshgrid(SOUTH + np.arange(SIDE * 8 + 1) / 8, WEST + np.arange(SIDE * 8 + 1) / 8)
@@ -109,12 +109,13 @@ def test_a_flight_across_all_tiles_sees_the_shadows_of_the_whole_in_bounded_memo
         piece = pieces.around(here[0], here[1], reach_m)
         assert pieces.held_posts <= kept
         assert pieces.around(here[0], here[1], reach_m) is piece
-        read, before = read + (piece is not before), piece
+        read, before = read + int(piece is not before), piece
         expected, void = predict(whole.grid, pointing, bins, reach_m / bins, Beam())
         states, left = predict(piece.grid, pointing, bins, reach_m / bins, Beam())
         np.testing.assert_array_equal(states, expected)
         np.testing.assert_array_equal(left, void)
-        lost, shadowed = lost + np.count_nonzero(void), shadowed + np.count_nonzero(expected[~void] == DEM_SHADOW)
+        lost += int(np.count_nonzero(void))
+        shadowed += int(np.count_nonzero(expected[~void] == DEM_SHADOW))
     assert 8 < read < 40
     assert lost > 300, "at both ends, and over the void"
     assert shadowed > 10_000
@@ -173,7 +174,7 @@ def test_heights_that_no_ground_has_are_told_where_they_are_needed(tmp_path: Pat
         found.elevation(44.75, 7.25)
 
 
-def test_a_projected_file_is_warped_in_pieces(tmp_path: Path, wide: Wide, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_projected_file_is_warped_inpieces(tmp_path: Path, wide: Wide, monkeypatch: pytest.MonkeyPatch) -> None:
     """As one that is warped as a whole: GDAL places pixels to an eighth."""
     monkeypatch.setattr(terrain, "BLOCK_DEG", 0.03125)
     found = wide(utm_plane(tmp_path / "utm.tif"), kept_posts=40_000)
@@ -181,7 +182,7 @@ def test_a_projected_file_is_warped_in_pieces(tmp_path: Path, wide: Wide, monkey
     lon, lat = Transformer.from_crs("EPSG:32619", "EPSG:4326", always_xy=True).transform(EAST + east, NORTH - north)
     expected = 500 + 0.05 * east + 0.03 * north
     np.testing.assert_allclose(found.elevation(lat, lon), expected, atol=0.125 * SPACING * np.hypot(0.05, 0.03))
-    assert len(found._pieces) > 1
+    assert len(found.pieces) > 1
 
 
 def test_a_file_that_is_read_by_strips_is_the_same(binary: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -205,7 +206,7 @@ def test_the_checksum_of_wide_terrain_is_of_sizes_and_a_block_of_each_mib(tmp_pa
 SETTINGS = MonitorSettings(tracked_scans=2)
 
 
-def test_a_monitor_over_pieces_judges_as_one_over_the_whole(
+def test_a_monitor_overpieces_judges_as_one_over_the_whole(
     white_mountains: Terrain, white_mountains_path: Path, tmp_path: Path, wide: Wide, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """An alert with its offset search, tracked shadows and water, and an aircraft outside the files."""
@@ -276,7 +277,7 @@ def test_water_is_drawn_on_a_piece_as_on_the_whole_and_goes_with_it(
         seen += water.on(piece).wet.sum()
     assert seen > 10_000
     del piece
-    assert len(water._drawn) == len(pieces._pieces) < 5
+    assert len(water._drawn) == len(pieces.pieces) < 5
 
 
 def test_water_away_from_wide_terrain_is_refused_and_a_lost_file_is_told_when_it_is_drawn(
