@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test rig-test lint bench evidence latency load full-load hours soak crash agreement cold-start
+.PHONY: demo test rig-test lint bench evidence latency load full-load hours soak crash agreement cold-start wide-terrain
 .PHONY: rebaseline calibration dbc setup lock clean
 
 demo: $(READY)
@@ -67,6 +67,11 @@ cold-start: $(READY)
 	$(BIN)/python -m benchmarks.cold_start
 
 # The demo radar's calibration file, from flights that neither the demo nor `make evidence` uses.
+# A hundred tiles of an arc-second, 10 x 10 degrees: opening, scans along a track, peak memory.
+wide-terrain: $(READY)
+	$(BIN)/python -m benchmarks.wide_terrain
+
+# The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
 calibration: $(READY)
 	$(BIN)/python -m benchmarks.calibrate_demo
 

@@ -12,7 +12,8 @@ from gateway.doctor.clock import host_clock
 from gateway.errors import GatewayError
 from monitor.calibration import Calibration, load_calibration
 from monitor.integrity import Monitor
-from monitor.terrain import TerrainError, open_terrain
+from monitor.terrain import open_terrain
+from monitor.terrain_files import TerrainError
 from monitor.water import open_water
 
 
@@ -27,7 +28,7 @@ def build_monitor(config: RackConfig, calibration: Calibration | None = None) ->
             return None
         terrain = open_terrain(config.terrain)
         large_km2 = config.monitor.minimum_water_km2
-        water = open_water(config.water, terrain.grid, large_km2) if config.water else None
+        water = open_water(config.water, terrain, large_km2) if config.water else None
         return Monitor(terrain, config.monitor, calibration, water)
     except (TerrainError, ValueError) as error:
         raise GatewayError(str(error)) from error

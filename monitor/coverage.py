@@ -1,16 +1,17 @@
 """Why the stored terrain says nothing where the aircraft is: it flies outside the files, or over a gap in them."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from monitor.prediction import Pointing
-from monitor.terrain import Grid, Terrain
+from monitor.terrain import Extent
 
 
-def uncovered(terrain: Terrain, pointing: Pointing) -> list[str]:
-    """Reasons with their mend, for radials (n,) that start where the ground below is not known."""
+def uncovered(ground_m: NDArray[np.float64], extent: Extent, pointing: Pointing) -> list[str]:
+    """Reasons with their mend, for radials (n,) that start where the ground below (n,) is not known."""
     lat, lon = pointing.latitude_deg, pointing.longitude_deg
-    unknown = np.isnan(terrain.elevation(lat, lon))
-    south, north, west, east = extent(terrain.grid)
+    unknown = np.isnan(ground_m)
+    south, north, west, east = extent
     outside = unknown & ((lat < south) | (lat > north) | (lon < west) | (lon > east))
     reasons = []
     if outside.any():
@@ -25,10 +26,3 @@ def uncovered(terrain: Terrain, pointing: Pointing) -> list[str]:
             f"the stored terrain has a gap below the aircraft, at {lat[k]:.3f} {lon[k]:.3f}: name a file that fills it"
         )
     return reasons
-
-
-def extent(grid: Grid) -> tuple[float, float, float, float]:
-    """South, north, west and east of the outermost posts, degrees."""
-    rows, columns = grid.height_m.shape
-    south, east = grid.north_deg - (rows - 1) * grid.row_deg, grid.west_deg + (columns - 1) * grid.column_deg
-    return south, grid.north_deg, grid.west_deg, east

@@ -18,7 +18,7 @@ from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, Test, examine
 from monitor.disparity import statistic, threshold
 from monitor.geodesy import LONGEST_RANGE_NM, NM_M
 from monitor.hysteresis import Hysteresis
-from monitor.offset import Search
+from monitor.offset import FINE_M, Search
 from monitor.pointing import point
 from monitor.prediction import Pointing
 from monitor.quantities import RADIO_HEIGHT
@@ -28,12 +28,14 @@ from monitor.scans import Scan
 from monitor.screening import Screens
 from monitor.settings import MonitorSettings
 from monitor.terrain import Terrain
+from monitor.terrain_files import TerrainError
 from monitor.tracking import ShadowTracker, fronts_of
 from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
-from monitor.water import Water
+from monitor.water import Water, WaterError, WaterFiles
 from monitor.window import Window
 
 MOST_UNMATCHED = 0.6  # share of shadows; without a calibration more of them forbid an ok
+FLOWN_M = 2000.0  # farther than an aircraft flies between a radial in use and one that is not
 
 
 class Monitor:
@@ -44,7 +46,7 @@ class Monitor:
         terrain: Terrain,
         settings: MonitorSettings | None = None,
         calibration: Calibration | None = None,
-        water: Water | None = None,
+        water: WaterFiles | None = None,
     ) -> None:
         self.terrain = terrain
         self.settings = settings or MonitorSettings()
@@ -81,17 +83,23 @@ class Monitor:
         height_m = aircraft.tracks[RADIO_HEIGHT.name].at(scan.time_ns[chosen]).value
         if limit_m is not None and (high := too_high(height_m, limit_m)):
             return self.unavailable(scan.number, [high, *reasons]), None
-        screens, told = self._screens(scan, pointing, height_m)
-        comparison, left_out = compare(scan, chosen, pointing, self.terrain, self.settings, screens)
-        reasons += [*told, *left_out, *uncovered(self.terrain, pointing)]
+        try:
+            here = self.terrain.around(pointing.latitude_deg, pointing.longitude_deg, self._reach_m(scan))
+            water = self.water.on(here) if self.water else None
+        except (TerrainError, WaterError) as error:
+            return self.unavailable(scan.number, [str(error), *reasons]), None
+        ground_m = here.elevation(pointing.latitude_deg, pointing.longitude_deg)
+        screens, told = self._screens(scan, pointing, height_m, water)
+        comparison, left_out = compare(scan, chosen, pointing, here, self.settings, screens)
+        reasons += [*told, *left_out, *uncovered(ground_m, self.terrain.extent, pointing)]
         if self.settings.tracked_scans > 1:
             every, known, _ = point(scan, aircraft, steady, self.settings)
-            fronts = fronts_of(scan, steady[known], every, self.terrain.grid, self.settings)
+            fronts = fronts_of(scan, steady[known], every, here.grid, self.settings)
             self._tracker.add(int(scan.time_ns[-1]), fronts)
-        verdict = self._decide(scan, comparison, self._buried(pointing), reasons)
+        verdict = self._decide(scan, comparison, _buried(ground_m, pointing), reasons)
         if verdict.verdict == ALERT and self.settings.offset_search_m:
             calibration = self.calibration or uncalibrated(scan.bins.shape[1])
-            search = Search(scan, chosen, pointing, self.terrain, self.settings, calibration, screens)
+            search = Search(scan, chosen, pointing, here, self.settings, calibration, screens)
             found = search.most_likely()
             verdict = replace(
                 verdict,
@@ -114,16 +122,20 @@ class Monitor:
             return f"the range bins look like {bits} bits each: check radar_profile, or the channel's profile"
         return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm) if self.calibration else None
 
+    def _reach_m(self, scan: Scan) -> float:
+        """How far from the radials in use the terrain of a scan may be looked at, moved about and on all radials."""
+        return scan.range_nm * NM_M + math.sqrt(2) * (self.settings.offset_search_m + sum(FINE_M)) + FLOWN_M
+
     def _screens(
-        self, scan: Scan, pointing: Pointing, height_over_ground_m: NDArray[np.float64]
+        self, scan: Scan, pointing: Pointing, height_over_ground_m: NDArray[np.float64], water: Water | None
     ) -> tuple[Screens, list[str]]:
         """What decides which bins and shadows of a scan count, and what is to be said of it."""
         s, before = self.settings, self._tracker.before(int(scan.time_ns[0]))
         if not s.first_bin_from_radio_altitude:
-            return Screens(None, self.water, before), []
+            return Screens(None, water, before), []
         bin_width_m = scan.range_nm * NM_M / scan.bins.shape[1]
         near, told = first_bins(height_over_ground_m, pointing.elevation_rad, s.beam_width_deg, bin_width_m)
-        return Screens(near, self.water, before), told
+        return Screens(near, water, before), told
 
     def unavailable(self, scan: int, reasons: list[str]) -> Verdict:
         """The verdict that nothing can be said about a scan that could not be compared."""
@@ -184,12 +196,6 @@ class Monitor:
         levels = f"{c.level.lowest:.2f} to {c.level.highest:.2f}"
         return [f"{found} in the farther half, where calibration {c.name} has {levels}: check the radar's gain"]
 
-    def _buried(self, pointing: Pointing) -> list[str]:
-        """What forbids an ok where the aircraft is under the ground, as terrain in feet or a wrong datum puts it."""
-        ground_m = self.terrain.elevation(pointing.latitude_deg, pointing.longitude_deg)
-        below_m = float(np.fmax.reduce(ground_m - pointing.height_m, initial=0.0))
-        return [f"the aircraft is {below_m:.0f} m below the stored terrain: check unit and datum"] if below_m else []
-
     def _contradictions(self, sample: ScanSample, findings: Findings) -> list[str]:
         """What forbids an ok that rests on stated defaults: they may be too wide for this radar, and hide an error."""
         if self.calibration:
@@ -203,6 +209,12 @@ class Monitor:
 
     def _caveats(self) -> list[str]:
         return ["no calibration loaded: stated defaults in use"] if self.calibration is None else []
+
+
+def _buried(ground_m: NDArray[np.float64], pointing: Pointing) -> list[str]:
+    """What forbids an ok where the aircraft is under the ground, as terrain in feet or a wrong datum puts it."""
+    below_m = float(np.fmax.reduce(ground_m - pointing.height_m, initial=0.0))
+    return [f"the aircraft is {below_m:.0f} m below the stored terrain: check unit and datum"] if below_m else []
 
 
 def _gaps(scan: Scan) -> list[str]:

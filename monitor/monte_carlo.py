@@ -57,6 +57,11 @@ class Setup(NamedTuple):
     seed: int
     radials: int = 360
 
+    @property
+    def reach_m(self) -> float:
+        """How far the terrain is looked at."""
+        return self.bins * self.bin_width_m + MARGIN_M
+
 
 class Outcome(NamedTuple):
     """Of some runs: the residuals; radials on which the reference has a shadow, and those that left the terrain."""
@@ -90,7 +95,7 @@ def simulate(grid: Grid, setup: Setup, runs: range) -> Outcome:
 
 def around(grid: Grid, setup: Setup) -> Grid:
     """The part of a grid that the radar reaches: fewer posts to draw noise for. The place lies within the grid."""
-    reach_m = setup.bins * setup.bin_width_m + MARGIN_M
+    reach_m = setup.reach_m
     phi = math.radians(setup.true.latitude_deg)
     meridian, prime = curvature_radii(phi)
     high, wide = (math.degrees(reach_m / radius) for radius in (meridian, prime * math.cos(phi)))

@@ -1,37 +1,29 @@
 """The terrain store: GeoTIFF, SRTM HGT and DTED files as one grid of posts, sampled bilinearly.
 
-Posts are indexed by pixel *centres*: GDAL widens the bounds of HGT and DTED cells by half a post, so the centres are
-the posts of the standard. Voids become NaN before anything interpolates, so a void post spoils the four cells around
-it and nothing else.
+Voids become NaN before anything interpolates, so a void post spoils the four cells around it and nothing else. What is
+too large to be held as a whole is read in pieces, where it is needed.
 """
 
 import math
-import zlib
+from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
-import rasterio
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
-from rasterio._err import CPLE_BaseError  # what GDAL says where rasterio has no error of its own for it
-from rasterio.crs import CRS
-from rasterio.enums import Resampling
-from rasterio.errors import RasterioError
-from rasterio.vrt import WarpedVRT
 
 from monitor.ceiling import ceilings
+from monitor.geodesy import curvature_radii
+from monitor.terrain_files import Part, TerrainError, TerrainFiles
 
-MOST_POSTS = 400_000_000  # 1.6 GB; files far apart would fill the memory with nothing
-WGS84 = CRS.from_epsg(4326)
-LOWEST_M, HIGHEST_M = -500.0, 9000.0  # no ground on Earth lies outside
-ALIGNMENT_POSTS = 0.05  # files whose posts miss a common grid by more are refused: resampling is not ours to hide
+WHOLE_POSTS = 40_000_000  # 160 MB; up to here files are held as a whole
+KEPT_POSTS = 100_000_000  # 400 MB of pieces that are kept beside the newest
+MOST_POSTS = 400_000_000  # 1.6 GB; what is needed at once must not fill the memory
+BLOCK_DEG = 0.5  # pieces end on multiples of it
+BEYOND = 1.01  # of the reach, for what the radii of curvature change over it
 NO_CEILING = np.empty((0, 0), np.float32)
-
-
-class TerrainError(ValueError):
-    """A terrain file that is missing, unreadable, without a place on Earth, or not on the grid of its neighbours."""
 
 
 class Grid(NamedTuple):
@@ -52,106 +44,156 @@ class Grid(NamedTuple):
         return self._replace(height_m=height_m, ceiling_m=NO_CEILING)
 
 
+class Extent(NamedTuple):
+    """Latitudes and longitudes of the outermost posts, degrees."""
+
+    south: float
+    north: float
+    west: float
+    east: float
+
+    @classmethod
+    def of(cls, rows: int, columns: int, north_deg: float, west_deg: float, row_deg: float, column_deg: float) -> Self:
+        """Of so many posts from the north-western one on."""
+        return cls(north_deg - (rows - 1) * row_deg, north_deg, west_deg, west_deg + (columns - 1) * column_deg)
+
+
 class Terrain:
-    """Stored terrain heights. Made by `open_terrain`."""
+    """Stored terrain heights in memory. `open_terrain` makes it of files that are small enough."""
 
     def __init__(self, grid: Grid, paths: Sequence[Path], checksum: str) -> None:
-        self.grid = grid
+        self._grid = grid
+        rows, columns = grid.height_m.shape
+        self.extent = Extent.of(rows, columns, *grid[1:5])
         self.paths = tuple(paths)
         self.checksum = checksum
+
+    @property
+    def grid(self) -> Grid:
+        """All posts."""
+        return self._grid
+
+    def around(
+        self,
+        latitude_deg: NDArray[np.float64],  # noqa: ARG002 # as WideTerrain's
+        longitude_deg: NDArray[np.float64],  # noqa: ARG002
+        reach_m: float,  # noqa: ARG002
+    ) -> "Terrain":
+        """Terrain in memory that holds all ground within reach of any of these places (n,)."""
+        return self
 
     def elevation(self, latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> NDArray[np.float64]:
         """Heights in metres at WGS 84 degrees, any shape; NaN where a needed post is void or outside the files."""
         lat, lon = np.broadcast_arrays(np.asarray(latitude_deg, float), np.asarray(longitude_deg, float))
-        return _sample_all(self.grid, lat.ravel(), lon.ravel()).reshape(lat.shape)
+        return self._elevation(lat.ravel(), lon.ravel()).reshape(lat.shape)
+
+    def _elevation(self, lat: NDArray[np.float64], lon: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(_sample_all(self._grid, lat, lon))
+
+
+class WideTerrain(Terrain):
+    """Stored terrain of which only pieces are in memory: those last used, up to `KEPT_POSTS`, or one larger one.
+
+    `pieces` are those, the last used at the end.
+    What it says raises TerrainError, naming the file and the mend, where one cannot be read any more.
+    """
+
+    def __init__(self, files: TerrainFiles, checksum: str) -> None:
+        self._files = files
+        self.pieces: OrderedDict[Part, Terrain] = OrderedDict()  # the last used at the end
+        self.extent = Extent.of(*files.whole)
+        self.paths = files.paths
+        self.checksum = checksum
+
+    @property
+    def grid(self) -> Grid:
+        """All posts, as far as there is memory for them; a TerrainError beyond."""
+        return self._piece(Part(0, 0, self._files.whole.rows, self._files.whole.columns)).grid
+
+    def around(self, latitude_deg: NDArray[np.float64], longitude_deg: NDArray[np.float64], reach_m: float) -> Terrain:
+        """A piece that holds all ground within reach of any of these places (n,).
+
+        It ends on multiples of `BLOCK_DEG`, or where the files do: which one it is depends on nothing but the places
+        and the reach, so that a replay looks at the same posts in the same order.
+        """
+        south, north, west, east = (
+            float(end) for end in (latitude_deg.min(), latitude_deg.max(), longitude_deg.min(), longitude_deg.max())
+        )
+        high = BEYOND * math.degrees(reach_m / curvature_radii(math.radians(south))[0])
+        farthest_deg = min(max(abs(south), abs(north)) + high, 89.0)
+        wide = BEYOND * math.degrees(reach_m / math.cos(math.radians(farthest_deg)) / curvature_radii(0.0)[1])
+        rows, columns, north_deg, west_deg, row_deg, column_deg = self._files.whole
+        top, bottom = _cut(north_deg - _up(north + high), north_deg - _down(south - high), row_deg, rows)
+        left, right = _cut(_down(west - wide) - west_deg, _up(east + wide) - west_deg, column_deg, columns)
+        return self._piece(Part(top, left, bottom, right))
+
+    def _piece(self, part: Part) -> Terrain:
+        piece = self.pieces.pop(part, None) or self._read(part)
+        self.pieces[part] = piece
+        return piece
+
+    def _read(self, part: Part) -> Terrain:
+        rows, columns = part.shape
+        if rows * columns > MOST_POSTS:
+            raise TerrainError(
+                f"the terrain that is needed at once spans {rows} x {columns} posts, more than there is memory for "
+                f"({MOST_POSTS}): choose a shorter range, or terrain with fewer posts to a degree"
+            )
+        while self.pieces and self.held_posts + rows * columns > KEPT_POSTS:
+            self.pieces.popitem(last=False)
+        _, _, north_deg, west_deg, row_deg, column_deg = self._files.whole
+        height_m = self._files.heights_m(part)
+        corner = north_deg - part.top * row_deg, west_deg + part.left * column_deg
+        return Terrain(Grid(height_m, *corner, row_deg, column_deg, ceilings(height_m)), self.paths, self.checksum)
+
+    @property
+    def held_posts(self) -> int:
+        """How many posts are in memory."""
+        return sum(piece.grid.height_m.size for piece in self.pieces.values())
+
+    def _elevation(self, lat: NDArray[np.float64], lon: NDArray[np.float64]) -> NDArray[np.float64]:
+        out = np.full(lat.size, np.nan)
+        south, north, west, east = self.extent
+        known = np.flatnonzero((lat >= south) & (lat <= north) & (lon >= west) & (lon <= east))
+        blocks = np.floor(np.stack([lat[known], lon[known]], axis=1) / BLOCK_DEG)
+        _, block = np.unique(blocks, axis=0, return_inverse=True)
+        order = np.argsort(block, kind="stable")
+        for some in np.split(known[order], np.flatnonzero(np.diff(block[order])) + 1):
+            if some.size:
+                out[some] = self.around(lat[some], lon[some], 0.0).elevation(lat[some], lon[some])
+        return out
+
+
+def _down(degrees: float) -> float:
+    return math.floor(degrees / BLOCK_DEG) * BLOCK_DEG
+
+
+def _up(degrees: float) -> float:
+    return math.ceil(degrees / BLOCK_DEG) * BLOCK_DEG
+
+
+def _cut(begin_deg: float, end_deg: float, step_deg: float, posts: int) -> tuple[int, int]:
+    """The first post of an axis that is needed and the one behind the last: two that exist, even if none is."""
+    first = min(max(math.floor(begin_deg / step_deg), 0), posts - 2)
+    return first, max(min(math.ceil(end_deg / step_deg) + 1, posts), first + 2)
 
 
 def open_terrain(path_or_paths: str | Path | Sequence[str | Path]) -> Terrain:
     """Open one terrain file or mosaic several that share a post spacing.
 
-    Raises TerrainError, naming the file and the mend, for a file that is missing, cannot be read, has no coordinate
-    reference system, or does not lie on the same grid as the first. Of overlapping files the first with a height wins.
+    Of more than `WHOLE_POSTS` posts, gaps between files included, headers are read and the heights where they are
+    needed. Raises TerrainError, naming the file and the mend, for a file that is missing, cannot be read, has no
+    coordinate reference system, or does not lie on the same grid as the first. Of overlapping files the first with a
+    height wins.
     """
     given = [path_or_paths] if isinstance(path_or_paths, str | Path) else list(path_or_paths)
     if not given:
         raise TerrainError("no terrain file given: name at least one GeoTIFF, HGT or DTED file")
-    paths = [Path(p) for p in given]
-    tiles = [_read(path) for path in paths]
-    checksum = 0
-    for path in paths:
-        checksum = zlib.crc32(path.read_bytes(), checksum)
-    grid = _mosaic(tiles, paths)
-    return Terrain(grid._replace(ceiling_m=ceilings(grid.height_m)), paths, f"{checksum:08x}")
-
-
-def _read(path: Path) -> Grid:
-    try:
-        if not path.is_file():
-            raise TerrainError(f"terrain file {path} does not exist: check the path in the configuration or --dem")
-        path.open("rb").close()
-        with rasterio.open(path) as source:
-            if source.crs is None:
-                raise TerrainError(f"{path} has no coordinate reference system: assign one with gdal_edit.py -a_srs")
-            if source.crs == WGS84:
-                return _grid(source)
-            # The warped raster has corners that the source does not reach: NaN, or they would read as 0 m.
-            warp = {"crs": WGS84, "resampling": Resampling.bilinear, "nodata": math.nan, "dtype": "float32"}
-            with WarpedVRT(source, **warp) as geographic:
-                return _grid(geographic)
-    except CPLE_BaseError as error:
-        nowhere = f"{path} has a coordinate reference system that is of no place on Earth"
-        raise TerrainError(f"{nowhere}: assign one with gdal_edit.py -a_srs") from error
-    except PermissionError as error:
-        raise TerrainError(f"terrain file {path} may not be read: give this user the right to read it") from error
-    except (RasterioError, OSError) as error:
-        raise TerrainError(f"{path} cannot be read as terrain (GeoTIFF, HGT or DTED): {error}") from error
-
-
-def _grid(source: rasterio.DatasetReader) -> Grid:
-    if source.count != 1:
-        raise TerrainError(f"{source.name} has {source.count} bands: a terrain file has one, of heights in metres")
-    if min(source.shape) < 2:
-        raise TerrainError(f"{source.name} has {source.height} x {source.width} posts: 2 x 2 are the least")
-    height_m = source.read(1, masked=True).astype(np.float32).filled(np.nan)
-    if np.any((height_m < LOWEST_M) | (height_m > HIGHEST_M)):
-        extremes = f"{np.nanmin(height_m):.0f} to {np.nanmax(height_m):.0f}"
-        raise TerrainError(f"{source.name} holds heights of {extremes} m: mark voids as nodata, convert to metres")
-    t = source.transform
-    if t.b or t.d or t.a <= 0 or t.e >= 0:
-        raise TerrainError(f"{source.name} is not a north-up raster: warp it with gdalwarp")
-    if not (t.f <= 90 - t.e and t.f + t.e * source.height >= -90 + t.e and math.isfinite(t.c)):
-        raise TerrainError(f"{source.name} has posts at no latitude or longitude: mend it with gdal_edit.py -a_ullr")
-    return Grid(height_m, t.f + t.e / 2, t.c + t.a / 2, -t.e, t.a)
-
-
-def _mosaic(tiles: list[Grid], paths: list[Path]) -> Grid:
-    first = tiles[0]
-    if len(tiles) == 1:
-        return first
-    offsets = [_offset(tile, first, path) for tile, path in zip(tiles, paths, strict=True)]
-    top, left = min(row for row, _ in offsets), min(column for _, column in offsets)
-    corners = [(row - top, column - left) for row, column in offsets]
-    rows = max(row + tile.height_m.shape[0] for (row, _), tile in zip(corners, tiles, strict=True))
-    columns = max(column + tile.height_m.shape[1] for (_, column), tile in zip(corners, tiles, strict=True))
-    if rows * columns > MOST_POSTS:
-        raise TerrainError(f"the terrain files span {rows} x {columns} posts: name only those that the flight needs")
-    height_m = np.full((rows, columns), np.nan, np.float32)
-    for (row, column), tile in zip(corners, tiles, strict=True):
-        place = height_m[row : row + tile.height_m.shape[0], column : column + tile.height_m.shape[1]]
-        np.copyto(place, tile.height_m, where=np.isnan(place))
-    north_deg, west_deg = first.north_deg - top * first.row_deg, first.west_deg + left * first.column_deg
-    return Grid(height_m, north_deg, west_deg, first.row_deg, first.column_deg)
-
-
-def _offset(tile: Grid, first: Grid, path: Path) -> tuple[int, int]:
-    row = (first.north_deg - tile.north_deg) / first.row_deg
-    column = (tile.west_deg - first.west_deg) / first.column_deg
-    same_spacing = math.isclose(tile.row_deg, first.row_deg, rel_tol=1e-6) and math.isclose(
-        tile.column_deg, first.column_deg, rel_tol=1e-6
-    )
-    if not same_spacing or max(abs(row - round(row)), abs(column - round(column))) > ALIGNMENT_POSTS:
-        raise TerrainError(f"{path} is not on the grid of the first terrain file: warp it to that grid with gdalwarp")
-    return round(row), round(column)
+    files = TerrainFiles([Path(p) for p in given])
+    if files.whole.rows * files.whole.columns > WHOLE_POSTS:
+        return WideTerrain(files, files.sampled_checksum())
+    height_m = files.heights_m(Part(0, 0, files.whole.rows, files.whole.columns))
+    return Terrain(Grid(height_m, *files.whole[2:], ceilings(height_m)), files.paths, files.checksum())
 
 
 @njit(cache=True)

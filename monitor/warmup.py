@@ -5,22 +5,25 @@ import numpy as np
 from decoders.arinc708 import unpack
 from decoders.formats import MODES_708, WORD_708_BYTES
 from monitor.aircraft import Aircraft
+from monitor.ceiling import ceilings
 from monitor.integrity import Monitor
 from monitor.pointing import NEEDED
 from monitor.quantities import RADIO_HEIGHT
 from monitor.scans import ScanBuilder
+from monitor.terrain import Extent, Grid, Terrain
 
 SECOND_NS = 1_000_000_000
+SPACING_DEG, HALF = 0.001, 300  # posts to each side: the made-up scan reaches 10 NM
 
 
 def warm_up(monitor: Monitor) -> None:
-    """Judge a made-up scan over the middle of the terrain and forget the answer."""
-    grid = monitor.terrain.grid
+    """Judge a made-up scan over made-up ground and forget the answer: the stored one may be void, or not at hand."""
+    ground = _ridges(monitor.terrain.extent)
     aircraft = Aircraft()
     middle = {
-        "latitude_deg": grid.north_deg - grid.height_m.shape[0] / 2 * grid.row_deg,
-        "longitude_deg": grid.west_deg + grid.height_m.shape[1] / 2 * grid.column_deg,
-        "height_m": float(np.nanmax(grid.height_m)),
+        "latitude_deg": (ground.extent.south + ground.extent.north) / 2,
+        "longitude_deg": (ground.extent.west + ground.extent.east) / 2,
+        "height_m": 1500.0,
     }
     times = np.array([0, SECOND_NS // 10])
     for quantity in (*NEEDED, RADIO_HEIGHT):
@@ -38,4 +41,13 @@ def warm_up(monitor: Monitor) -> None:
     builder = ScanBuilder()
     scans = [*builder.feed(np.full(n, SECOND_NS // 20), radials), *builder.finish()]
     settings = monitor.settings.model_copy(update={"minimum_pairs": 2, "position_gate": False})
-    Monitor(monitor.terrain, settings, water=monitor.water).judge(scans[-1], aircraft)
+    Monitor(ground, settings, water=monitor.water).judge(scans[-1], aircraft)
+
+
+def _ridges(extent: Extent) -> Terrain:
+    """Ridges across the way north, 2 km apart, around the middle of an area."""
+    latitude_deg, longitude_deg = (extent.south + extent.north) / 2, (extent.west + extent.east) / 2
+    rows_m = 500 + 500 * np.sin(np.arange(HALF * 2) * (2 * np.pi / 20))
+    height_m = np.repeat(rows_m.astype(np.float32)[:, None], HALF * 2, axis=1)
+    corner = latitude_deg + HALF * SPACING_DEG, longitude_deg - HALF * SPACING_DEG
+    return Terrain(Grid(height_m, *corner, SPACING_DEG, SPACING_DEG, ceilings(height_m)), (), "")

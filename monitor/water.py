@@ -1,15 +1,18 @@
 """Large water: still water returns as little as a shadow does, so that dark bins over it are no evidence of terrain.
 
 Young, Uijt de Haag and Campbell (2004), section 4 (d). The water is drawn on the posts of the terrain, from rasters in
-which every value but 0 is water and from GeoJSON polygons.
+which every value but 0 is water and from GeoJSON polygons: on all of them at once, or on a piece of wide terrain when
+it is needed.
 """
 
 import json
 import math
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import rasterio
@@ -27,9 +30,11 @@ from monitor.geodesy import curvature_radii
 from monitor.places import line, place
 from monitor.prediction import Pointing
 from monitor.shade import last_dark
-from monitor.terrain import WGS84, Grid
+from monitor.terrain import Extent, Grid, Terrain, WideTerrain
+from monitor.terrain_files import WGS84
 
 POLYGONS = (".geojson", ".json")
+Draw = Callable[[Grid], NDArray[np.bool_]]  # which posts of a grid are water
 AROUND = np.ones((3, 3), np.uint8)  # posts that touch at a corner are of one water
 
 
@@ -38,40 +43,70 @@ class WaterError(ValueError):
 
 
 class Water:
-    """Large water on the posts of a terrain. Made by `open_water`."""
+    """Large water on the posts of a terrain in memory. Made by `WaterFiles.on`."""
 
-    def __init__(self, grid: Grid, wet: NDArray[np.bool_], paths: Sequence[Path], checksum: str) -> None:
+    def __init__(self, grid: Grid, wet: NDArray[np.bool_]) -> None:
         self.grid = grid
         self.wet = wet
-        self.paths = tuple(paths)
-        self.checksum = checksum
 
     def below(self, found: NDArray[np.void], pointing: Pointing, bin_width_m: float) -> NDArray[np.bool_]:
         """Which shadows (k,) on radials (n,) have a dark bin whose centre lies over water, on the boresight."""
         return np.asarray(_below(self.grid, self.wet, pointing, bin_width_m, found))
 
 
-def open_water(path_or_paths: Path | Sequence[Path], grid: Grid, minimum_km2: float) -> Water:
-    """Draw the water of some files on a terrain's posts, and leave out what is smaller than `minimum_km2` there.
+class WaterFiles:
+    """The water of some files, drawn on terrain and kept as long as that terrain is. Made by `open_water`."""
 
-    Raises WaterError, naming the file and the mend, for a file that is missing or cannot be read, has no coordinate
-    reference system or no polygons, or lies outside the terrain.
+    def __init__(self, draws: dict[Path, Draw], minimum_km2: float, checksum: str) -> None:
+        self._draws = draws
+        self._minimum_km2 = minimum_km2
+        self._drawn: WeakKeyDictionary[Terrain, Water] = WeakKeyDictionary()
+        self.checksum = checksum
+
+    def on(self, terrain: Terrain) -> Water:
+        """The water on terrain in memory, without what is smaller there than the minimum.
+
+        Raises WaterError, naming the file, for one that cannot be read any more.
+        """
+        water = self._drawn.get(terrain)
+        if water is None:
+            wet = np.zeros(terrain.grid.height_m.shape, bool)
+            for path, draw in self._draws.items():
+                with _told(path):
+                    wet |= draw(terrain.grid)
+            water = self._drawn[terrain] = Water(terrain.grid, _large(wet, terrain.grid, self._minimum_km2))
+        return water
+
+
+def open_water(path_or_paths: Path | Sequence[Path], terrain: Terrain, minimum_km2: float) -> WaterFiles:
+    """Read where the water of some files lies; what is smaller than `minimum_km2` on the terrain will be left out.
+
+    It is drawn at once on terrain that is in memory. Raises WaterError, naming the file and the mend, for a file that
+    is missing or cannot be read, has no coordinate reference system or no polygons, or lies outside the terrain.
     """
     paths = [path_or_paths] if isinstance(path_or_paths, Path) else list(path_or_paths)
-    wet = np.zeros(grid.height_m.shape, bool)
+    draws: dict[Path, Draw] = {}
     checksum = 0
     for path in paths:
-        try:
+        with _told(path):
             content = path.read_bytes()
-            wet |= (_polygons if path.suffix.lower() in POLYGONS else _raster)(path, grid)
-        except (RasterioError, OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-            raise WaterError(f"water file {path} cannot be read as a raster or GeoJSON: {error}") from error
+            draws[path] = (_polygons if path.suffix.lower() in POLYGONS else _raster)(path, terrain.extent)
         checksum = zlib.crc32(content, checksum)
-    return Water(grid, _large(wet, grid, minimum_km2), paths, f"{checksum:08x}")
+    water = WaterFiles(draws, minimum_km2, f"{checksum:08x}")
+    if not isinstance(terrain, WideTerrain):
+        water.on(terrain)
+    return water
 
 
-def _raster(path: Path, grid: Grid) -> NDArray[np.bool_]:
-    rows, columns = grid.height_m.shape
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (RasterioError, OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise WaterError(f"water file {path} cannot be read as a raster or GeoJSON: {error}") from error
+
+
+def _raster(path: Path, extent: Extent) -> Draw:
     with rasterio.open(path) as source:
         if source.crs is None:
             raise WaterError(
@@ -81,13 +116,18 @@ def _raster(path: Path, grid: Grid) -> NDArray[np.bool_]:
             raise WaterError(
                 f"water file {path} has {source.count} bands: one is needed, with 0 where there is no water"
             )
-        _meets(path, transform_bounds(source.crs, WGS84, *source.bounds), grid)
+        _meets(path, transform_bounds(source.crs, WGS84, *source.bounds), extent)
+
+    def draw(grid: Grid) -> NDArray[np.bool_]:
+        rows, columns = grid.height_m.shape
         warp = {"crs": WGS84, "transform": _transform(grid), "width": columns, "height": rows}
-        with WarpedVRT(source, **warp, resampling=Resampling.nearest) as posts:
+        with rasterio.open(path) as source, WarpedVRT(source, **warp, resampling=Resampling.nearest) as posts:
             return np.asarray(np.nan_to_num(posts.read(1, masked=True).filled(0)) != 0)
 
+    return draw
 
-def _polygons(path: Path, grid: Grid) -> NDArray[np.bool_]:
+
+def _polygons(path: Path, extent: Extent) -> Draw:
     document = json.loads(path.read_text("utf-8"))
     crs = _crs(path, document)
     found = [*_areas(document)]
@@ -97,8 +137,12 @@ def _polygons(path: Path, grid: Grid) -> NDArray[np.bool_]:
         raise WaterError(f"water file {path} holds a polygon without closed rings of numbers: mend or remove it")
     shapes = [shape if crs == WGS84 else transform_geom(crs, WGS84, shape) for shape in found]
     west, south, east, north = zip(*(bounds(shape) for shape in shapes), strict=True)
-    _meets(path, (min(west), min(south), max(east), max(north)), grid)
-    return np.asarray(rasterize(shapes, grid.height_m.shape, transform=_transform(grid), dtype="uint8") > 0)
+    _meets(path, (min(west), min(south), max(east), max(north)), extent)
+
+    def draw(grid: Grid) -> NDArray[np.bool_]:
+        return np.asarray(rasterize(shapes, grid.height_m.shape, transform=_transform(grid), dtype="uint8") > 0)
+
+    return draw
 
 
 def _crs(path: Path, document: Any) -> CRS:
@@ -144,11 +188,9 @@ def _transform(grid: Grid) -> Affine:
     return Affine(grid.column_deg, 0, west_deg, 0, -grid.row_deg, north_deg)
 
 
-def _meets(path: Path, box: tuple[float, float, float, float], grid: Grid) -> None:
+def _meets(path: Path, box: tuple[float, float, float, float], extent: Extent) -> None:
     west, south, east, north = box
-    rows, columns = grid.height_m.shape
-    south_deg, east_deg = grid.north_deg - (rows - 1) * grid.row_deg, grid.west_deg + (columns - 1) * grid.column_deg
-    if not (west <= east_deg and east >= grid.west_deg and south <= grid.north_deg and north >= south_deg):
+    if not (west <= extent.east and east >= extent.west and south <= extent.north and north >= extent.south):
         raise WaterError(
             f"water file {path} lies outside the terrain: it reaches from {south:.3f} to {north:.3f} N and "
             f"{west:.3f} to {east:.3f} E; name only those that the flight needs, or mend its reference system"
@@ -159,13 +201,21 @@ def _large(wet: NDArray[np.bool_], grid: Grid, minimum_km2: float) -> NDArray[np
     """The water of connected posts that together stand for at least so much ground."""
     from scipy.ndimage import label  # noqa: PLC0415 # only where there is water, as it takes its time
 
-    numbers, _ = label(wet, AROUND)
+    numbers, count = label(wet, AROUND)
     latitudes = np.radians(grid.north_deg - np.arange(len(wet)) * grid.row_deg)
     radii = np.array([curvature_radii(latitude) for latitude in latitudes])
     post_km2 = radii.prod(axis=1) * np.cos(latitudes) * math.radians(grid.row_deg) * math.radians(grid.column_deg) / 1e6
-    rows, columns = np.nonzero(numbers)
-    area_km2 = np.bincount(numbers[rows, columns], weights=post_km2[rows])
-    return np.asarray((area_km2 >= minimum_km2)[numbers] & wet) if rows.size else wet
+    return np.asarray((_areas_km2(numbers, count, post_km2) >= minimum_km2)[numbers] & wet)
+
+
+@njit(cache=True)
+def _areas_km2(numbers, count, post_km2):  # type: ignore[no-untyped-def] # typed by _large; numpy would need 24 B a post
+    area_km2 = np.zeros(count + 1)  # 0 numbers what is dry
+    for i in range(numbers.shape[0]):
+        for j in range(numbers.shape[1]):
+            if numbers[i, j]:
+                area_km2[numbers[i, j]] += post_km2[i]
+    return area_km2
 
 
 @njit(cache=True)

@@ -64,9 +64,8 @@ class Place(NamedTuple):
 
 def place_of(terrain: Terrain, at: str | None) -> Place:
     """The place that "LAT,LON" names, or the middle of the terrain. Raises GatewayError if there is no ground."""
-    grid = terrain.grid
-    rows, columns = grid.height_m.shape
-    middle = [grid.north_deg - (rows - 1) / 2 * grid.row_deg, grid.west_deg + (columns - 1) / 2 * grid.column_deg]
+    south, north, west, east = terrain.extent
+    middle = [(south + north) / 2, (west + east) / 2]
     latitude, longitude = _numbers(at, 2, "--at takes LAT,LON in degrees, as 44.5,-71.5") if at else middle
     ground = float(terrain.elevation(latitude, longitude))
     if math.isnan(ground):

@@ -77,6 +77,7 @@ def calibrate_dem(
 
     Prints the residuals of shadow edges, centres and sizes for each height.
     """
+    import numpy as np
     from rich.progress import track
 
     from gateway.calibrate import dem as study
@@ -86,22 +87,24 @@ def calibrate_dem(
     from gateway.tables import plain_console, print_table
     from monitor.monte_carlo import Variables
     from monitor.settings import MonitorSettings
-    from monitor.terrain import TerrainError, open_terrain
+    from monitor.terrain import open_terrain
+    from monitor.terrain_files import TerrainError
 
     rack = load_config(config) if config else None
     if paper and (bins or range_nm):
         raise GatewayError("--paper has the paper's radar: leave --bins and --range-nm out")
     try:
         terrain = open_terrain(dem or (rack.terrain if rack else ()))
+        place = study.place_of(terrain, at)
+        true = Variables(place.latitude_deg, place.longitude_deg, tilt_deg=tilt_deg)
+        settings = rack.monitor if rack else MonitorSettings()
+        setup = study.setup_of(true, settings, bins or 512, range_nm or 10.0, post_noise_m, seed)
+        setup = study.as_published(setup) if paper else setup
+        here = terrain.around(np.array(place.latitude_deg), np.array(place.longitude_deg), setup.reach_m)
     except TerrainError as error:
         raise GatewayError(str(error)) from error
-    place = study.place_of(terrain, at)
-    true = Variables(place.latitude_deg, place.longitude_deg, tilt_deg=tilt_deg)
-    settings = rack.monitor if rack else MonitorSettings()
-    setup = study.setup_of(true, settings, bins or 512, range_nm or 10.0, post_noise_m, seed)
-    setup = study.as_published(setup) if paper else setup
     heights = study.heights_of(heights_m, place)
-    results = study.monte_carlo(terrain.grid, setup, heights, runs)
+    results = study.monte_carlo(here.grid, setup, heights, runs)
     found = list(track(results, "heights", len(heights), console=plain_console(), transient=True))
     rows, said = study.table(found), study.provenance(terrain, setup, runs)
     print_table(list(study.HEADINGS), rows)

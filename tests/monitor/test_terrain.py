@@ -12,7 +12,8 @@ from rasterio.transform import Affine
 from rasterio.windows import Window
 
 from monitor import terrain
-from monitor.terrain import Grid, Terrain, TerrainError, open_terrain
+from monitor.terrain import Grid, Terrain, open_terrain
+from monitor.terrain_files import TerrainError
 
 
 def write(
@@ -228,15 +229,16 @@ def test_a_line_of_posts_is_no_terrain(tmp_path: Path, shape: tuple[int, int]) -
         open_terrain(path)
 
 
-def test_files_far_apart_are_refused_before_they_fill_the_memory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_far_apart_open_and_are_not_loaded_as_a_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(terrain, "WHOLE_POSTS", 1000)
     monkeypatch.setattr(terrain, "MOST_POSTS", 1000)
-    heights = np.zeros((4, 4), np.int16)
+    heights = np.full((4, 4), 7, np.int16)
     near = write(tmp_path / "near.tif", heights, north_up(7, 45, 0.25))
     far = write(tmp_path / "far.tif", heights, north_up(107, 45, 0.25))
-    with pytest.raises(TerrainError, match="span 4 x 404 posts: name only those that the flight needs"):
-        open_terrain([near, far])
+    wide = open_terrain([near, far])
+    assert wide.elevation(44.5, [7.5, 50, 107.5]).tolist()[::2] == [7, 7]
+    with pytest.raises(TerrainError, match=r"spans 4 x 404 posts.*choose a shorter range"):
+        wide.grid.height_m.sum()
 
 
 def test_no_file_at_all_is_refused() -> None:

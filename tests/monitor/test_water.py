@@ -17,11 +17,11 @@ from monitor.scans import Scan
 from monitor.settings import MonitorSettings
 from monitor.shade import shadows
 from monitor.terrain import Grid, Terrain
-from monitor.water import Water, WaterError, open_water
+from monitor.water import WaterError, WaterFiles, open_water
 from tests.monitor.test_integrity import ANGLES, CALIBRATED, HERE, flying, judge, lit, scan_of
 
 # Posts 0.01 degrees apart at 45 N: 1.1 km southward and 0.79 km eastward, 0.876 square kilometres each.
-GRID = Grid(np.zeros((20, 30), np.float32), 45.1, 7.0, 0.01, 0.01)
+TERRAIN = Terrain(Grid(np.zeros((20, 30), np.float32), 45.1, 7.0, 0.01, 0.01), [], "")
 GEOD = Geod(ellps="WGS84")
 BIN_M = 18_520 / 512
 
@@ -48,8 +48,8 @@ def raster(path: Path, values: NDArray[Any], west: float, north: float, step: fl
     return path
 
 
-def posts(water: Water) -> set[tuple[int, int]]:
-    return {(int(row), int(column)) for row, column in zip(*np.nonzero(water.wet), strict=True)}
+def posts(water: WaterFiles) -> set[tuple[int, int]]:
+    return {(int(row), int(column)) for row, column in zip(*np.nonzero(water.on(TERRAIN).wet), strict=True)}
 
 
 FOUR = {(3, 5), (3, 6), (4, 5), (4, 6)}  # posts at 45.07 and 45.06 N, 7.05 and 7.06 E
@@ -68,13 +68,13 @@ OVER_FOUR = square(7.045, 45.055, 7.065, 45.075)
     ids=lambda document: document["type"],
 )
 def test_posts_inside_polygons_are_water_however_geojson_holds_them(tmp_path: Path, document: object) -> None:
-    assert posts(open_water(written(tmp_path / "w.geojson", document), GRID, 0.0)) == FOUR
+    assert posts(open_water(written(tmp_path / "w.geojson", document), TERRAIN, 0.0)) == FOUR
 
 
 def test_an_island_is_land(tmp_path: Path) -> None:
     lake = square(7.045, 45.035, 7.075, 45.075)
     lake["coordinates"].append(square(7.055, 45.055, 7.065, 45.065)["coordinates"][0])
-    found = posts(open_water(written(tmp_path / "w.json", lake), GRID, 0.0))
+    found = posts(open_water(written(tmp_path / "w.json", lake), TERRAIN, 0.0))
     assert found == {(row, column) for row in (3, 4, 5, 6) for column in (5, 6, 7)} - {(4, 6)}
 
 
@@ -86,38 +86,38 @@ def test_polygons_in_another_reference_system_are_transformed(tmp_path: Path) ->
         "coordinates": [ring],
         "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32632"}},
     }
-    assert posts(open_water(written(tmp_path / "w.geojson", document), GRID, 0.0)) == FOUR
+    assert posts(open_water(written(tmp_path / "w.geojson", document), TERRAIN, 0.0)) == FOUR
     document["crs"]["properties"]["name"] = "EPSG:999999"  # type: ignore[index]
     with pytest.raises(WaterError, match="reference system that is known"):
-        open_water(written(tmp_path / "w.geojson", document), GRID, 0.0)
+        open_water(written(tmp_path / "w.geojson", document), TERRAIN, 0.0)
 
 
 def test_every_value_but_0_and_nodata_of_a_raster_is_water(tmp_path: Path) -> None:
     values = np.zeros((20, 30), np.uint8)
     values[3, 5:7], values[4, 5:7], values[9, 9] = 1, 200, 255
     path = raster(tmp_path / "w.tif", values, 6.995, 45.105, 0.01, nodata=255)
-    assert posts(open_water(path, GRID, 0.0)) == FOUR
+    assert posts(open_water(path, TERRAIN, 0.0)) == FOUR
     values = np.where(values == 255, np.nan, values).astype(np.float32)
-    assert posts(open_water(raster(tmp_path / "f.tif", values, 6.995, 45.105, 0.01), GRID, 0.0)) == FOUR
+    assert posts(open_water(raster(tmp_path / "f.tif", values, 6.995, 45.105, 0.01), TERRAIN, 0.0)) == FOUR
 
 
 def test_a_raster_that_covers_a_part_of_the_terrain_says_nothing_of_the_rest(tmp_path: Path) -> None:
     path = raster(tmp_path / "w.tif", np.ones((4, 4), np.uint8), 7.045, 45.075, 0.005)
-    assert posts(open_water(path, GRID, 0.0)) == FOUR
+    assert posts(open_water(path, TERRAIN, 0.0)) == FOUR
 
 
 def test_a_raster_in_another_reference_system_is_transformed(tmp_path: Path) -> None:
     west, north = Transformer.from_crs("EPSG:4326", "EPSG:32632", always_xy=True).transform(7.045, 45.075)
     path = raster(tmp_path / "w.tif", np.ones((22, 16), np.uint8), west, north, 100.0, crs="EPSG:32632")
-    assert posts(open_water(path, GRID, 0.0)) == FOUR
+    assert posts(open_water(path, TERRAIN, 0.0)) == FOUR
 
 
 def test_several_files_are_one_water_with_a_checksum_of_them_all(tmp_path: Path) -> None:
     one = written(tmp_path / "a.geojson", square(7.045, 45.055, 7.055, 45.075))
     two = written(tmp_path / "b.geojson", square(7.055, 45.055, 7.065, 45.075))
-    both = open_water([one, two], GRID, 0.0)
+    both = open_water([one, two], TERRAIN, 0.0)
     assert posts(both) == FOUR
-    assert both.checksum not in {open_water(path, GRID, 0.0).checksum for path in (one, two)}
+    assert both.checksum not in {open_water(path, TERRAIN, 0.0).checksum for path in (one, two)}
 
 
 def test_only_large_water_counts_with_what_touches_at_a_corner(tmp_path: Path) -> None:
@@ -137,7 +137,7 @@ def test_only_large_water_counts_with_what_touches_at_a_corner(tmp_path: Path) -
         (1.995 * cell_km2, corner),
         (2.01 * cell_km2, set()),
     ):
-        assert posts(open_water(path, GRID, large_km2)) == expected
+        assert posts(open_water(path, TERRAIN, large_km2)) == expected
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_geojson_that_says_nothing_of_the_terrain_is_refused_by_name(
     tmp_path: Path, document: object, why: str
 ) -> None:
     with pytest.raises(WaterError, match=rf"w\.geojson .*{why}"):
-        open_water(written(tmp_path / "w.geojson", document), GRID, 1.0)
+        open_water(written(tmp_path / "w.geojson", document), TERRAIN, 1.0)
 
 
 def test_files_that_cannot_be_used_are_refused_by_name(tmp_path: Path) -> None:
@@ -191,7 +191,7 @@ def test_files_that_cannot_be_used_are_refused_by_name(tmp_path: Path) -> None:
         (two, "has 2 bands"),
     ):
         with pytest.raises(WaterError, match=f"{path.name} .*{why}"):
-            open_water(path, GRID, 1.0)
+            open_water(path, TERRAIN, 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -221,8 +221,7 @@ def test_shadows_with_a_dark_bin_over_large_water_do_not_count_in_either_thread(
     """All ground west of a meridian, half a post beside the posts, becomes a lake."""
     shore = -72 + 250.5 / 1200
     lake = square(-72.1, 43.9, shore, 45.1)
-    grid = white_mountains.grid
-    water = open_water(written(tmp_path / "lake.geojson", lake), grid, 1.0)
+    water = open_water(written(tmp_path / "lake.geojson", lake), white_mountains, 1.0)
     _, plain = judge(white_mountains, honest)
     found = shadows(plain.dem_states, "dem", 3)
     wet = []
@@ -247,6 +246,6 @@ def test_shadows_with_a_dark_bin_over_large_water_do_not_count_in_either_thread(
 
 def test_water_that_is_not_large_costs_nothing(white_mountains: Terrain, honest: Scan, tmp_path: Path) -> None:
     lake = written(tmp_path / "lake.geojson", square(-72.1, 43.9, -70.9, 45.1))
-    water = open_water(lake, white_mountains.grid, 1e6)
+    water = open_water(lake, white_mountains, 1e6)
     verdict, _ = Monitor(white_mountains, MonitorSettings(), CALIBRATED, water).judge(honest, flying())
     assert verdict == judge(white_mountains, honest)[0]

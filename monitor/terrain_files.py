@@ -1,0 +1,184 @@
+"""Terrain files side by side: where the posts of each lie on the grid they share, and the heights of any part of it.
+
+Posts are indexed by pixel *centres*: GDAL widens the bounds of HGT and DTED cells by half a post, so the centres are
+the posts of the standard. Opening reads headers only, and no file stays open.
+"""
+
+import math
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import rasterio
+from numpy.typing import NDArray
+from rasterio._err import CPLE_BaseError  # what GDAL says where rasterio has no error of its own for it
+from rasterio.crs import CRS
+from rasterio.enums import Resampling
+from rasterio.errors import RasterioError
+from rasterio.vrt import WarpedVRT
+from rasterio.windows import Window
+
+WGS84 = CRS.from_epsg(4326)
+LOWEST_M, HIGHEST_M = -500.0, 9000.0  # no ground on Earth lies outside
+ALIGNMENT_POSTS = 0.05  # files whose posts miss a common grid by more are refused: resampling is not ours to hide
+POSTS_AT_ONCE = 40_000_000  # of a file: what is read is a few times as large as what becomes of it
+SAMPLE_BYTES, SAMPLE_EVERY = 4096, 1 << 20
+
+
+class TerrainError(ValueError):
+    """A terrain file that is missing, unreadable, without a place on Earth, or not on the grid of its neighbours."""
+
+
+class Sheet(NamedTuple):
+    """The posts of a file: their number, the north-western one in degrees, and the degrees between them."""
+
+    rows: int
+    columns: int
+    north_deg: float
+    west_deg: float
+    row_deg: float
+    column_deg: float
+
+
+class Part(NamedTuple):
+    """Rows `top` to `bottom` - 1 and columns `left` to `right` - 1 of the common grid."""
+
+    top: int
+    left: int
+    bottom: int
+    right: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.bottom - self.top, self.right - self.left
+
+    def common(self, other: "Part") -> "Part":
+        """What lies in both; of no or negative rows or columns where nothing does."""
+        corner = max(self.top, other.top), max(self.left, other.left)
+        return Part(*corner, min(self.bottom, other.bottom), min(self.right, other.right))
+
+
+class TerrainFiles:
+    """Files on one grid. Raises TerrainError, naming the file and the mend, for one that is not, or is no terrain."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.paths = tuple(paths)
+        self._sheets = [_header(path) for path in paths]
+        first = self._sheets[0]
+        offsets = [_offset(sheet, first, path) for sheet, path in zip(self._sheets, paths, strict=True)]
+        top, left = min(row for row, _ in offsets), min(column for _, column in offsets)
+        self._parts = [
+            Part(row - top, column - left, row - top + sheet.rows, column - left + sheet.columns)
+            for (row, column), sheet in zip(offsets, self._sheets, strict=True)
+        ]
+        rows, columns = max(part.bottom for part in self._parts), max(part.right for part in self._parts)
+        north_deg, west_deg = first.north_deg - top * first.row_deg, first.west_deg + left * first.column_deg
+        self.whole = Sheet(rows, columns, north_deg, west_deg, first.row_deg, first.column_deg)
+
+    def heights_m(self, part: Part) -> NDArray[np.float32]:
+        """Heights of a part in metres, NaN where void or in no file; of overlapping files the first with a height wins.
+
+        Raises TerrainError, naming the file and the mend, for one that cannot be read, has heights that no ground has,
+        or is not what it was when it was opened.
+        """
+        height_m = np.full(part.shape, np.nan, np.float32)
+        for path, sheet, place in zip(self.paths, self._sheets, self._parts, strict=True):
+            top, left, bottom, right = part.common(place)
+            if top >= bottom or left >= right:
+                continue
+            ours = height_m[top - part.top : bottom - part.top, left - part.left : right - part.left]
+            step = max(1, POSTS_AT_ONCE // (right - left))
+            with _opened(path) as source:
+                if _sheet(source) != sheet:
+                    raise TerrainError(f"{path} has other posts than when it was opened: start anew")
+                for row in range(0, bottom - top, step):
+                    rows = ours[row : row + step]
+                    window = Window(left - place.left, top - place.top + row, rows.shape[1], rows.shape[0])
+                    np.copyto(rows, _heights_m(source, window), where=np.isnan(rows))
+        return height_m
+
+    def checksum(self) -> str:
+        """CRC-32 of all bytes of the files, in hexadecimal."""
+        checksum = 0
+        for path in self.paths:
+            checksum = zlib.crc32(path.read_bytes(), checksum)
+        return f"{checksum:08x}"
+
+    def sampled_checksum(self) -> str:
+        """CRC-32 of each file's size (8 bytes, the least first) and the first 4 KiB of each MiB of it, in turn."""
+        checksum = 0
+        for path in self.paths:
+            size = path.stat().st_size
+            checksum = zlib.crc32(size.to_bytes(8, "little"), checksum)
+            with path.open("rb", buffering=0) as file:
+                for at in range(0, size, SAMPLE_EVERY):
+                    file.seek(at)
+                    checksum = zlib.crc32(file.read(SAMPLE_BYTES), checksum)
+        return f"{checksum:08x}"
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[rasterio.DatasetReader]:
+    """A file in degrees, for as long as it is read."""
+    try:
+        if not path.is_file():
+            raise TerrainError(f"terrain file {path} does not exist: check the path in the configuration or --dem")
+        path.open("rb").close()
+        with rasterio.open(path) as source:
+            if source.crs is None:
+                raise TerrainError(f"{path} has no coordinate reference system: assign one with gdal_edit.py -a_srs")
+            if source.crs == WGS84:
+                yield source
+                return
+            # The warped raster has corners that the source does not reach: NaN, or they would read as 0 m.
+            warp = {"crs": WGS84, "resampling": Resampling.bilinear, "nodata": math.nan, "dtype": "float32"}
+            with WarpedVRT(source, **warp) as geographic:
+                yield geographic
+    except CPLE_BaseError as error:
+        nowhere = f"{path} has a coordinate reference system that is of no place on Earth"
+        raise TerrainError(f"{nowhere}: assign one with gdal_edit.py -a_srs") from error
+    except PermissionError as error:
+        raise TerrainError(f"terrain file {path} may not be read: give this user the right to read it") from error
+    except (RasterioError, OSError) as error:
+        raise TerrainError(f"{path} cannot be read as terrain (GeoTIFF, HGT or DTED): {error}") from error
+
+
+def _header(path: Path) -> Sheet:
+    with _opened(path) as source:
+        return _sheet(source)
+
+
+def _sheet(source: rasterio.DatasetReader) -> Sheet:
+    if source.count != 1:
+        raise TerrainError(f"{source.name} has {source.count} bands: a terrain file has one, of heights in metres")
+    if min(source.shape) < 2:
+        raise TerrainError(f"{source.name} has {source.height} x {source.width} posts: 2 x 2 are the least")
+    t = source.transform
+    if t.b or t.d or t.a <= 0 or t.e >= 0:
+        raise TerrainError(f"{source.name} is not a north-up raster: warp it with gdalwarp")
+    if not (t.f <= 90 - t.e and t.f + t.e * source.height >= -90 + t.e and math.isfinite(t.c)):
+        raise TerrainError(f"{source.name} has posts at no latitude or longitude: mend it with gdal_edit.py -a_ullr")
+    return Sheet(source.height, source.width, t.f + t.e / 2, t.c + t.a / 2, -t.e, t.a)
+
+
+def _heights_m(source: rasterio.DatasetReader, window: Window) -> NDArray[np.float32]:
+    height_m = np.asarray(source.read(1, window=window, masked=True).astype(np.float32).filled(np.nan))
+    if np.any((height_m < LOWEST_M) | (height_m > HIGHEST_M)):
+        extremes = f"{np.nanmin(height_m):.0f} to {np.nanmax(height_m):.0f}"
+        raise TerrainError(f"{source.name} holds heights of {extremes} m: mark voids as nodata, convert to metres")
+    return height_m
+
+
+def _offset(sheet: Sheet, first: Sheet, path: Path) -> tuple[int, int]:
+    row = (first.north_deg - sheet.north_deg) / first.row_deg
+    column = (sheet.west_deg - first.west_deg) / first.column_deg
+    same_spacing = math.isclose(sheet.row_deg, first.row_deg, rel_tol=1e-6) and math.isclose(
+        sheet.column_deg, first.column_deg, rel_tol=1e-6
+    )
+    if not same_spacing or max(abs(row - round(row)), abs(column - round(column))) > ALIGNMENT_POSTS:
+        raise TerrainError(f"{path} is not on the grid of the first terrain file: warp it to that grid with gdalwarp")
+    return round(row), round(column)
