@@ -66,12 +66,11 @@ agreement: $(READY)
 cold-start: $(READY)
 	$(BIN)/python -m benchmarks.cold_start
 
-# The demo radar's calibration file, from flights that neither the demo nor `make evidence` uses.
 # A hundred tiles of an arc-second, 10 x 10 degrees: opening, scans along a track, peak memory.
 wide-terrain: $(READY)
 	$(BIN)/python -m benchmarks.wide_terrain
 
-# The demo radar's calibration file, from flights that neither the demo nor `make integrity` uses.
+# The demo radar's calibration file, from flights that neither the demo nor `make evidence` uses.
 calibration: $(READY)
 	$(BIN)/python -m benchmarks.calibrate_demo
 
