@@ -7,6 +7,7 @@ of the scans is fitted, the other half checks the fit, and the checked rates go 
 from benchmarks.flights import Flight, fly_all
 from gateway.demo import CALIBRATION
 from monitor.fitting import fit
+from monitor.settings import MonitorSettings
 from simulators.campaign import draw_legs
 from simulators.scenario import white_mountains
 
@@ -26,7 +27,7 @@ def main() -> None:
         scans[:half],
         scans[half:],
         P_FAS,
-        MINIMUM_PAIRS,
+        MonitorSettings(minimum_pairs=MINIMUM_PAIRS),
         name="demo-white-mountains",
         provenance=f"{len(scans)} simulated fault-free scans of {LEGS} flights over N44W072, seed {SEED}, "
         "250 to 500 m above the highest ground below, median signal-to-noise ratio 18 dB at 5 to 10 NM",

@@ -67,6 +67,7 @@ def compare(
     radar = radar_states(echoes)
     seen = shadows(radar, "radar", s.minimum_size, s.maximum_size)
     predicted = shadows(dem, "dem", s.minimum_size, s.maximum_size)
+    others = [shadows(radar, "radar", s.minimum_size), shadows(dem, "dem", s.minimum_size)]  # large ones hide too
     scene = Scene(terrain.grid, angles, Pointing(*(column[~void] for column in pointing)), bin_width_m)
     counts = screen(seen, predicted, scene, s, screens)
     counted, expected = seen[counts.radar], predicted[counts.dem]
@@ -81,8 +82,8 @@ def compare(
         pairs["radial"],
         whole["centre"][pairs["radar"]],
         foreseen["centre"][pairs["dem"]],
-        Unmatched(*unmatched_share(counted, predicted, dem)),
-        Unmatched(*unmatched_share(expected, seen, radar)),
+        Unmatched(*unmatched_share(counted, others[1], dem)),
+        Unmatched(*unmatched_share(expected, others[0], radar)),
     ), [*lost, *counts.reasons]
 
 

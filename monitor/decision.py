@@ -3,19 +3,22 @@
 The statistic, T as published or the robust Q, looks at the disparities of pairs. The unmatched shares look at shadows
 without a partner, so they see what is too far off to pair, and may alert where there are too few pairs for the
 statistic. Their shares scatter more than a binomial would, since shadows of a scan stand or fall together: the
-threshold is a quantile of the beta distribution with the mean m that calibration found and the variance
-m (1 - m) (1 / n + rho).
+threshold is a quantile of the beta-binomial distribution with the mean m that calibration found, and of the share the
+variance m (1 - m) (1 / n + rho).
 """
 
 from dataclasses import dataclass
 
-from scipy.special import betaincinv
+import numpy as np
+from scipy.special import betaln
 
 from monitor.calibration import Calibration, UnmatchedModel
 from monitor.disparity import minimum_detectable_bias, normalised, robust_statistic, robust_threshold, threshold
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
 
+LEAST_RHO = 1e-6  # which is a binomial
+MOST_PAIRS = 1000  # beyond, no further ones would make Q see
 RADAR_SHARE, DEM_SHARE = "the unmatched share of radar shadows", "the unmatched share of terrain shadows"
 
 
@@ -65,14 +68,14 @@ def examine(sample: ScanSample, settings: MonitorSettings, calibration: Calibrat
     each = settings.p_fa * settings.unmatched_budget / 2
     radar = _unmatched(RADAR_SHARE, sample.unmatched_radar, radar_model, each)
     dem = _unmatched(DEM_SHARE, sample.unmatched_dem, dem_model, each)
-    p_fa = settings.p_fa - each * sum(model is not None for model in (radar_model, dem_model))
+    p_fa = _p_fa_of_statistic(settings, calibration)
     if len(d) < settings.pairs_needed:
         return Findings(None, f"{len(d)} pairs of shadows, {settings.pairs_needed} needed", radar, dem)
     q = robust_statistic(d, c.median_bins, c.clip_bins, c.sigma_bins)
     t = normalised(d, c.rms_bins)
     if settings.method == "robust":
         test = Test("Q", q, robust_threshold(len(d), p_fa, c.variance_factor))
-        most = len(d) * (c.clip_bins / c.sigma_bins) ** 2  # what Q comes to if every pair is clipped
+        most = _most(len(d), c)
         if most <= test.limit:
             blind = f"Q reaches {most:.1f} at most, its threshold is {test.limit:.1f}"
             return Findings(None, f"{len(d)} pairs cannot alert at P_FA {p_fa:g}: {blind}", radar, dem)
@@ -81,13 +84,42 @@ def examine(sample: ScanSample, settings: MonitorSettings, calibration: Calibrat
     return Findings(test, "", radar, dem, t, q, minimum_detectable_bias(len(d), c.rms_bins, p_fa, settings.p_md))
 
 
+def pairs_for_verdict(settings: MonitorSettings, calibration: Calibration) -> int:
+    """The least number of pairs with which the statistic can exceed its threshold."""
+    p_fa, least = _p_fa_of_statistic(settings, calibration), settings.pairs_needed
+    if settings.method == "paper":
+        return least
+    factor = calibration.variance_factor
+    enough = (n for n in range(least, MOST_PAIRS) if _most(n, calibration) > robust_threshold(n, p_fa, factor))
+    return next(enough, MOST_PAIRS)
+
+
+def _most(pairs: int, calibration: Calibration) -> float:
+    """What Q comes to if every pair is clipped."""
+    return pairs * (calibration.clip_bins / calibration.sigma_bins) ** 2
+
+
+def _p_fa_of_statistic(settings: MonitorSettings, calibration: Calibration) -> float:
+    """What the unmatched shares leave."""
+    models = (calibration.unmatched_radar, calibration.unmatched_dem) if settings.method == "robust" else ()
+    return settings.p_fa * (1 - settings.unmatched_budget / 2 * sum(model is not None for model in models))
+
+
 def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> float:
-    """The share that so many eligible shadows exceed with probability `p_fa` when nothing is wrong."""
-    spread = 1 / eligible + model.overdispersion  # as a share of the variance that a share could have at most
-    weight = 1 / spread - 1
-    if weight <= 0:
+    """The share that so many eligible shadows exceed with no more probability than `p_fa` when nothing is wrong.
+
+    1 where few of them cannot tell: that they are all unmatched is then more probable.
+    """
+    if eligible < 2:
         return 1.0
-    return float(betaincinv(model.mean * weight, (1 - model.mean) * weight, 1 - p_fa))
+    rho = max(model.overdispersion * eligible / (eligible - 1), LEAST_RHO)
+    if rho >= 1:
+        return 1.0
+    a, b = model.mean * (1 / rho - 1), (1 - model.mean) * (1 / rho - 1)
+    k = np.arange(eligible + 1)
+    ways = -betaln(eligible - k + 1, k + 1) - np.log(eligible + 1)
+    more = 1 - np.cumsum(np.exp(ways + betaln(k + a, eligible - k + b) - betaln(a, b)))  # than k, as probability
+    return float(np.argmax(more <= p_fa) / eligible)
 
 
 def _unmatched(name: str, found: Unmatched, model: UnmatchedModel | None, p_fa: float) -> Test | None:

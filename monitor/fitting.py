@@ -25,7 +25,7 @@ def fit(
     scans: Sequence[ScanSample],
     check: Sequence[ScanSample],
     p_fas: Sequence[float],
-    minimum_pairs: int,
+    settings: MonitorSettings,
     *,
     name: str,
     provenance: str,
@@ -34,8 +34,9 @@ def fit(
 ) -> Calibration:
     """Fit to fault-free scans, and count on other scans how often each P_FA would have alerted.
 
-    Scans with fewer than `minimum_pairs` are left out, as in flight. Raises ValueError if too few are left.
+    Scans with fewer pairs than the settings need are left out, as in flight. Raises ValueError if too few are left.
     """
+    minimum_pairs = settings.pairs_needed
     usable = [scan for scan in scans if len(scan.disparities) >= minimum_pairs]
     if len(usable) < 2:
         raise ValueError(
@@ -64,12 +65,12 @@ def fit(
         level=_levels(np.array([scan.level for scan in usable])),
     )
     held_out = [scan for scan in check if len(scan.disparities) >= minimum_pairs]
-    return made.model_copy(update={"checked": tuple(_checked(held_out, made, p_fa, minimum_pairs) for p_fa in p_fas)})
+    return made.model_copy(update={"checked": tuple(_checked(held_out, made, settings, p_fa) for p_fa in p_fas)})
 
 
-def _checked(scans: Sequence[ScanSample], made: Calibration, p_fa: float, minimum_pairs: int) -> CheckedRate:
-    settings = MonitorSettings(p_fa=p_fa, minimum_pairs=minimum_pairs)
-    alerts = sum(bool(examine(scan, settings, made).alerts) for scan in scans)
+def _checked(scans: Sequence[ScanSample], made: Calibration, settings: MonitorSettings, p_fa: float) -> CheckedRate:
+    asked = settings.model_copy(update={"p_fa": p_fa})
+    alerts = sum(bool(examine(scan, asked, made).alerts) for scan in scans)
     return CheckedRate(p_fa=p_fa, scans=len(scans), alerts=alerts)
 
 

@@ -14,7 +14,7 @@ from monitor.aircraft import Aircraft
 from monitor.calibration import NO_CALIBRATION, Calibration, uncalibrated
 from monitor.comparison import Comparison, compare, thin
 from monitor.coverage import uncovered
-from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, Test, examine
+from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, Test, examine, pairs_for_verdict
 from monitor.disparity import statistic, threshold
 from monitor.geodesy import LONGEST_RANGE_NM, NM_M
 from monitor.hysteresis import Hysteresis
@@ -96,17 +96,17 @@ class Monitor:
             every, known, _ = point(scan, aircraft, steady, self.settings)
             fronts = fronts_of(scan, steady[known], every, here.grid, self.settings)
             self._tracker.add(int(scan.time_ns[-1]), fronts)
-        verdict = self._decide(scan, comparison, _buried(ground_m, pointing), reasons)
-        if verdict.verdict == ALERT and self.settings.offset_search_m:
+        verdict, of_itself = self._decide(scan, comparison, _buried(ground_m, pointing), reasons)
+        if of_itself and self.settings.offset_search_m:
             calibration = self.calibration or uncalibrated(scan.bins.shape[1])
             search = Search(scan, chosen, pointing, here, self.settings, calibration, screens)
-            found = search.most_likely()
-            verdict = replace(
-                verdict,
-                offset_north_m=found.north_m,
-                offset_east_m=found.east_m,
-                offset_confidence=found.confidence,
-            )
+            if found := search.most_likely():
+                verdict = replace(
+                    verdict,
+                    offset_north_m=found.north_m,
+                    offset_east_m=found.east_m,
+                    offset_confidence=found.confidence,
+                )
         return verdict, comparison
 
     def _refusal(self, scan: Scan) -> str | None:
@@ -141,12 +141,21 @@ class Monitor:
         """The verdict that nothing can be said about a scan that could not be compared."""
         return self._told(scan, UNAVAILABLE, reasons, NOTHING, Findings(), 0)
 
-    def _decide(self, scan: Scan, comparison: Comparison, doubts: list[str], reasons: list[str]) -> Verdict:
+    def _decide(
+        self, scan: Scan, comparison: Comparison, doubts: list[str], reasons: list[str]
+    ) -> tuple[Verdict, bool]:
+        """The verdict, and whether it is an alert that this scan gives by itself."""
         bins = scan.bins.shape[1]
         now_ns, setting = int(scan.time_ns[-1]), (scan.range_nm, bins)
-        sample, scans = self._window.gather(now_ns, setting, comparison.sample(scan), self.settings.pairs_needed)
-        findings = examine(sample, self.settings, self.calibration or uncalibrated(bins))
+        calibration = self.calibration or uncalibrated(bins)
+        sample, scans = comparison.sample(scan), 1
         unlike = self._unlike_calibration(sample)
+        if unlike or doubts:  # which no scan to come may inherit
+            self._window = Window(self.settings.window_scans)
+        else:
+            needed = pairs_for_verdict(self.settings, calibration)
+            sample, scans = self._window.gather(now_ns, setting, sample, needed)
+        findings = examine(sample, self.settings, calibration)
         if findings.alerts:
             verdict, first = UNAVAILABLE if unlike else ALERT, [str(test) for test in findings.alerts]
         elif findings.statistic is None:
@@ -155,9 +164,9 @@ class Monitor:
             first = self._contradictions(sample, findings)
             verdict = UNAVAILABLE if first or doubts or unlike else OK
         gathered = [f"pairs of the last {scans} scans together"] if scans > 1 else []
-        return self._told(
-            scan.number, verdict, [*unlike, *first, *doubts, *gathered, *reasons], sample, findings, scans
-        )
+        because = [*unlike, *first, *doubts, *gathered, *reasons]
+        told = self._told(scan.number, verdict, because, sample, findings, scans)
+        return told, verdict == told.verdict == ALERT and scans == 1
 
     def _told(
         self, scan: int, verdict: str, reasons: list[str], sample: ScanSample, findings: Findings, scans: int

@@ -16,10 +16,10 @@ from monitor.geodesy import displace
 from monitor.prediction import Pointing
 from monitor.scans import Scan
 from monitor.screening import NO_SCREENS, Screens
-from monitor.settings import MonitorSettings
+from monitor.settings import SEARCH_STEP_M, MonitorSettings
 from monitor.terrain import Terrain
 
-STEP_M = 200.0  # shadows of mountains move together over about as far
+STEP_M = SEARCH_STEP_M
 FINE_M = (100.0, 50.0)  # to each side of the best so far
 COARSE_FAN = 3  # sub-azimuths are enough to find the neighbourhood
 
@@ -48,19 +48,23 @@ class Search:
     calibration: Calibration
     screens: Screens = NO_SCREENS
 
-    def most_likely(self) -> Offset:
-        """The most likely error of all within `offset_search_m` to the north, south, east and west."""
+    def most_likely(self) -> Offset | None:
+        """The most likely error within `offset_search_m` to each side, the least of equals; None if nothing pairs."""
         steps = int(self.settings.offset_search_m // STEP_M)
         places_m = STEP_M * np.arange(-steps, steps + 1)
         fan = min(self.settings.azimuth_fan, COARSE_FAN)
         log = np.array([[self._log_likelihood(n, e, fan) for e in places_m] for n in places_m])
-        row, column = np.unravel_index(log.argmax(), log.shape)
+        if not log.any():
+            return None
+        distance_m = np.hypot(*np.meshgrid(places_m, places_m))
+        row, column = np.unravel_index(np.lexsort((distance_m.ravel(), -log.ravel()))[0], log.shape)
         weight = np.exp(log - log.max())
         near = weight[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
         north_m, east_m = float(places_m[row]), float(places_m[column])
         for step_m in FINE_M:
-            around = [(north_m + n * step_m, east_m + e * step_m) for n in (-1, 0, 1) for e in (-1, 0, 1)]
-            north_m, east_m = max(around, key=lambda at: self._log_likelihood(at[0], at[1], self.settings.azimuth_fan))
+            around = [(north_m + n * step_m, east_m + e * step_m) for n in (0, -1, 1) for e in (0, -1, 1)]
+            inside = [at for at in around if max(map(abs, at)) <= self.settings.offset_search_m]
+            north_m, east_m = max(inside, key=lambda at: self._log_likelihood(at[0], at[1], self.settings.azimuth_fan))
         return Offset(north_m, east_m, float(near.sum() / weight.sum()))
 
     def _log_likelihood(self, north_m: float, east_m: float, fan: int) -> float:

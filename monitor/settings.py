@@ -4,6 +4,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+SEARCH_STEP_M = 200.0  # shadows of mountains move together over about as far
 HeightSource = Literal["076", "370"]
 
 
@@ -35,7 +36,7 @@ class MonitorSettings(BaseModel):
         1200.0,
         ge=0,
         le=5000,
-        description="how far to each side a horizontal error is sought that explains an alert; 0: never",
+        description="how far to each side a horizontal error is sought that explains an alert, 200 at least; 0: never",
     )
     p_md: float = Field(
         1e-3, gt=0, lt=1, description="probability of a missed detection that the stated MDB stands for"
@@ -98,6 +99,12 @@ class MonitorSettings(BaseModel):
     def _some_shadow_has_a_size(self) -> Self:
         if self.maximum_size is not None and self.maximum_size < self.minimum_size:
             raise ValueError(f"maximum_size {self.maximum_size} is below minimum_size {self.minimum_size}")
+        return self
+
+    @model_validator(mode="after")
+    def _a_search_has_more_than_one_place(self) -> Self:
+        if 0 < self.offset_search_m < SEARCH_STEP_M:
+            raise ValueError(f"offset_search_m {self.offset_search_m:g} is below {SEARCH_STEP_M:g}: 0 searches nothing")
         return self
 
     @property

@@ -14,11 +14,11 @@ from monitor.calibration import Calibration
 
 PAGE = Path(__file__).parents[2] / "docs" / "evidence.md"
 FAULT_FREE = 34  # flights of each terrain and clearance: 204
-FAULT_FREE_SCANS = 8
+FAULT_FREE_SCANS = 6
 CALIBRATING = 40
 CALIBRATING_SCANS = 4
 OTHERS = 30  # of another radar or another terrain noise
-FAULTY = 20
+FAULTY = 16
 SEED_CALIBRATION, SEED_FAULT_FREE, SEED_OTHERS, SEED_FAULTY = 1_100_000, 1_200_000, 1_300_000, 1_400_000
 
 INTRODUCTION = """# Evidence

@@ -101,7 +101,7 @@ def calibration(name: str, reads: Sequence[Read], found: Material, least_scans: 
             samples[:middle],
             samples[middle:],
             sorted({*P_FAS, settings.p_fa}, reverse=True),
-            needed,
+            settings,
             name=name,
             provenance=_provenance(reads, found, len(usable)),
             bins=found.bins,

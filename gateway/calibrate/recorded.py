@@ -56,7 +56,8 @@ def read(job: Job) -> Read:
     config, recorded = set_up(job, recording)
     if recorded is None:
         raise GatewayError(f"{job.path} was recorded without terrain: name the reference terrain with --dem")
-    monitor = Monitor(recorded.terrain, recorded.settings)  # without a calibration, for which some scans are not
+    # Without a calibration, which some scans may not be for.
+    monitor = Monitor(recorded.terrain, recorded.settings, water=recorded.water)
     names = ", ".join(path.name for path in monitor.terrain.paths)
     found = Read(job.name, _digest(recording), f"{names} (CRC-32 {monitor.terrain.checksum})", monitor.settings)
 

@@ -30,12 +30,14 @@ def calibrate_radar(
     from gateway.calibrate.recorded import read
     from gateway.calibrate.workers import on_all_cores
     from gateway.config import load_config
+    from gateway.recording.session import sessions
     from gateway.reprocess.job import jobs
     from gateway.tables import plain_console, print_table
 
     # What is to be made need not be there yet.
     rack = load_config(config).model_copy(update={"calibration": None}) if config else None
-    listed = {job.path: job for source in recordings for job in jobs(source, rack, dem or ())}
+    named = {job.path: job for source in recordings for job in jobs(source, rack, dem or ())}
+    listed = {first: named[first] for first, *_ in sessions(named)}  # which later files of a session come with
     results = on_all_cores(read, listed.values())
     reads = list(track(results, "recordings", len(listed), console=plain_console(), transient=True))
     for one in reads:

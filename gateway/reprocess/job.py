@@ -119,7 +119,7 @@ def set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
             f"{job.path} was recorded from {', '.join(sorted(names))}, and the rack file names none of them: "
             f"give one of its adapters ({', '.join(sorted(given))}) that name"
         )
-    maps = (*(job.terrain or config.terrain), *config.water)
+    maps = (*(job.terrain or config.terrain), *config.water, *((config.calibration,) if config.calibration else ()))
     files = [(path, path.stat().st_mtime_ns) for path in maps if path.exists()]
     made_with = tuple((name, recording.metadata[name]) for name in MADE_WITH if name in recording.metadata)
     return _made(job.config, job.terrain, made_with, tuple(files))
@@ -129,7 +129,7 @@ def set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
 def _made(
     config: str, terrain: tuple[Path, ...], metadata: tuple[tuple[str, str], ...], _: tuple[tuple[Path, int], ...]
 ) -> tuple[RackConfig, Monitor | None]:
-    """The same for all recordings that were made alike, as long as the files of terrain and water are the same."""
+    """The same for all recordings that were made alike, as long as the files that it rests on are the same."""
     if not config:
         recorded = recorded_config(dict(metadata))
         return recorded, recorded_monitor(dict(metadata), recorded, terrain)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.stats import betabinom, chi2
+from scipy.stats import betabinom, binom, chi2
 
 from monitor.calibration import Calibration, UnmatchedModel
-from monitor.decision import DEM_SHARE, RADAR_SHARE, examine, unmatched_threshold
+from monitor.decision import DEM_SHARE, RADAR_SHARE, examine, pairs_for_verdict, unmatched_threshold
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
 
@@ -29,15 +29,31 @@ def sample(n: int = 40, d: float = 1.0, radar: Unmatched = FEW, dem: Unmatched =
     return ScanSample(np.full(n, d), radar, dem, 2.0)
 
 
-@pytest.mark.parametrize("eligible", [20, 60, 200])
-@pytest.mark.parametrize("p_fa", [1e-2, 1e-4])
+@pytest.mark.parametrize("eligible", [2, 3, 5, 8, 20, 60, 200])
+@pytest.mark.parametrize("p_fa", [1e-1, 1e-2, 1e-4])
 def test_the_threshold_of_a_share_is_that_of_a_beta_binomial(eligible: int, p_fa: float) -> None:
-    """A beta-binomial of the same mean and variance exceeds it as often, but for its steps."""
-    rho = (MODEL.overdispersion + 1 / eligible - 1 / eligible) * eligible / (eligible - 1)
+    """Of the same mean and variance: more are unmatched with at most that probability, and one fewer will not do."""
+    rho = MODEL.overdispersion * eligible / (eligible - 1)
     weight = 1 / rho - 1
     other = betabinom(eligible, MODEL.mean * weight, (1 - MODEL.mean) * weight)
-    limit = unmatched_threshold(eligible, MODEL, p_fa)
-    assert 0.2 * p_fa < other.sf(np.floor(limit * eligible)) < 2 * p_fa
+    limit = round(unmatched_threshold(eligible, MODEL, p_fa) * eligible)
+    assert other.sf(limit) <= p_fa
+    assert other.sf(limit - 1) > p_fa
+
+
+def test_without_overdispersion_the_threshold_is_that_of_a_binomial() -> None:
+    limit = unmatched_threshold(80, UnmatchedModel(mean=0.25, overdispersion=0.0), 1e-3)
+    assert limit == binom.isf(1e-3, 80, 0.25) / 80
+
+
+def test_a_window_is_told_how_many_pairs_let_q_exceed_its_threshold() -> None:
+    """Q of n clipped pairs is 4 n: at a P_FA of 1e-9 it takes more than the 20 of the settings."""
+    settings = MonitorSettings(p_fa=1e-9)
+    needed = pairs_for_verdict(settings, BARE)
+    assert 4 * needed > chi2.isf(1e-9, needed)
+    assert 4 * (needed - 1) <= chi2.isf(1e-9, needed - 1)
+    assert needed > 20
+    assert pairs_for_verdict(settings.model_copy(update={"method": "paper"}), BARE) == 20
 
 
 def test_a_share_of_few_shadows_cannot_exceed_its_threshold() -> None:

@@ -10,11 +10,13 @@ from scipy.stats import betabinom, binom, norm
 from monitor.calibration import CLIP_FACTOR, Calibration, LevelLimits
 from monitor.fitting import fit
 from monitor.sample import ScanSample, Unmatched
+from monitor.settings import MonitorSettings
 
 Scans = list[NDArray[np.float64]]
 RNG_SEED = 6
 MEDIAN, SPREAD = 0.5, 2.0
 NONE = Unmatched(0, 0)
+SETTINGS = MonitorSettings(minimum_pairs=16)
 
 
 def normal_scans(scans: int, n: int = 50, common: float = 0.0) -> Scans:
@@ -26,7 +28,7 @@ def normal_scans(scans: int, n: int = 50, common: float = 0.0) -> Scans:
 def fitted(scans: Scans, check: Scans | None = None, p_fas: tuple[float, ...] = ()) -> Calibration:
     """To scans whose shadows all have partners."""
     fitting, checking = ([ScanSample(d, NONE, NONE, np.nan) for d in some] for some in (scans, check or []))
-    return fit(fitting, checking, p_fas, 16, name="made", provenance="drawn", bins=512, range_nm=10.0)
+    return fit(fitting, checking, p_fas, SETTINGS, name="made", provenance="drawn", bins=512, range_nm=10.0)
 
 
 def test_normal_disparities_give_back_their_parameters() -> None:
@@ -116,7 +118,7 @@ def fitted_to_shares(counts: Any, eligible: int, levels: NDArray[np.float64]) ->
         ScanSample(d, Unmatched(int(count), eligible), NONE, level)
         for d, count, level in zip(normal_scans(len(counts)), counts, levels, strict=True)
     ]
-    return fit(scans, [], (), 16, name="made", provenance="drawn")
+    return fit(scans, [], (), SETTINGS, name="made", provenance="drawn")
 
 
 def test_shares_of_a_beta_binomial_give_back_its_mean_and_overdispersion() -> None:

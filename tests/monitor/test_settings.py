@@ -28,6 +28,7 @@ IMPOSSIBLE: list[tuple[str, list[Any], str]] = [
     ("alert_scans", [0, 31], "(greater than or equal to 1|less than or equal to 30)"),
     ("clear_scans", [0, 31], "(greater than or equal to 1|less than or equal to 30)"),
     ("offset_search_m", [-1, 5001, nan, inf], "(greater than or equal to 0|less than or equal to 5000)"),
+    ("offset_search_m", [199.0], "offset_search_m 199 is below 200"),
     ("minimum_width_deg", [-1, 181, nan, inf], "(greater than or equal to 0|less than or equal to 180)"),
     ("pairing", ["second", None], "Input should be 'overlap' or 'first'"),
     ("radio_altitude_limit_m", [0, -1, 20_001, nan, inf], "(greater than 0|less than or equal to 20000)"),
