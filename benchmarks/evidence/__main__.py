@@ -14,8 +14,8 @@ from monitor.calibration import Calibration
 
 PAGE = Path(__file__).parents[2] / "docs" / "evidence.md"
 FAULT_FREE = 34  # flights of each terrain and clearance: 204
-FAULT_FREE_SCANS = 6
-CALIBRATING = 40
+FAULT_FREE_SCANS = 5
+CALIBRATING = 30
 CALIBRATING_SCANS = 4
 OTHERS = 30  # of another radar or another terrain noise
 FAULTY = 16
