@@ -118,7 +118,8 @@ def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> fl
     a, b = model.mean * (1 / rho - 1), (1 - model.mean) * (1 / rho - 1)
     k = np.arange(eligible + 1)
     ways = -betaln(eligible - k + 1, k + 1) - np.log(eligible + 1)
-    more = 1 - np.cumsum(np.exp(ways + betaln(k + a, eligible - k + b) - betaln(a, b)))  # than k, as probability
+    of_k = np.exp(ways + betaln(k + a, eligible - k + b) - betaln(a, b))
+    more = np.append(np.cumsum(of_k[:0:-1])[::-1], 0.0)  # probability of more than k, small ones summed first
     return float(np.argmax(more <= p_fa) / eligible)
 
 

@@ -19,7 +19,6 @@ from monitor.screening import NO_SCREENS, Screens
 from monitor.settings import SEARCH_STEP_M, MonitorSettings
 from monitor.terrain import Terrain
 
-STEP_M = SEARCH_STEP_M
 FINE_M = (100.0, 50.0)  # to each side of the best so far
 COARSE_FAN = 3  # sub-azimuths are enough to find the neighbourhood
 
@@ -50,8 +49,8 @@ class Search:
 
     def most_likely(self) -> Offset | None:
         """The most likely error within `offset_search_m` to each side, the least of equals; None if nothing pairs."""
-        steps = int(self.settings.offset_search_m // STEP_M)
-        places_m = STEP_M * np.arange(-steps, steps + 1)
+        steps = int(self.settings.offset_search_m // SEARCH_STEP_M)
+        places_m = SEARCH_STEP_M * np.arange(-steps, steps + 1)
         fan = min(self.settings.azimuth_fan, COARSE_FAN)
         log = np.array([[self._log_likelihood(n, e, fan) for e in places_m] for n in places_m])
         if not log.any():

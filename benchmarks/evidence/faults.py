@@ -13,9 +13,7 @@ from scipy.ndimage import uniform_filter, zoom
 from monitor.scans import Scan
 from monitor.terrain import Grid
 
-Heights = NDArray[np.float32]
 METRES_PER_DEGREE = 111_132.0
-DIRECTIONS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 SCAN_S = 61 * 3 / 40
 RIDGE_PERCENTILE = 90.0
 STALE_POSTS = 10  # averaged, as in terrain of the generation before
