@@ -4,9 +4,6 @@ from collections.abc import MutableMapping
 from pathlib import Path
 from typing import Any
 
-import tomlkit
-from tomlkit.exceptions import TOMLKitError
-
 OTHER = "\0"  # a value that no file has
 
 
@@ -16,6 +13,8 @@ def place(path: Path, text: str, *keys: str | int) -> str:
     The line of a table is that of its first value. What is not there stands where it would belong, and where no line
     can be said the file is named alone.
     """
+    from tomlkit.exceptions import TOMLKitError  # noqa: PLC0415 # only where there is an error, as it takes its time
+
     for depth in range(len(keys), 0, -1):
         try:
             return f"{path}:{_line(text, *keys[:depth])}"
@@ -26,6 +25,8 @@ def place(path: Path, text: str, *keys: str | int) -> str:
 
 def _line(text: str, *keys: str | int) -> int:
     """Write another value there, all else being kept as it stands: the first difference is where the value was."""
+    import tomlkit  # noqa: PLC0415 # as above
+
     document = tomlkit.parse(text)
     *outer, last = keys
     holder: Any = document

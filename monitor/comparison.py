@@ -65,9 +65,8 @@ def compare(
         near = np.arange(limit) < screens.bins_left_out[~void, None]
         echoes[near], dem[near] = 0, DEM_INITIAL  # the radials begin there, but nearer ground still casts its shadow
     radar = radar_states(echoes)
-    seen = shadows(radar, "radar", s.minimum_size, s.maximum_size)
-    predicted = shadows(dem, "dem", s.minimum_size, s.maximum_size)
-    others = [shadows(radar, "radar", s.minimum_size), shadows(dem, "dem", s.minimum_size)]  # large ones hide too
+    every_seen, every_predicted = shadows(radar, "radar", s.minimum_size), shadows(dem, "dem", s.minimum_size)
+    seen, predicted = (some[some["size"] <= (s.maximum_size or limit)] for some in (every_seen, every_predicted))
     scene = Scene(terrain.grid, angles, Pointing(*(column[~void] for column in pointing)), bin_width_m)
     counts = screen(seen, predicted, scene, s, screens)
     counted, expected = seen[counts.radar], predicted[counts.dem]
@@ -82,8 +81,8 @@ def compare(
         pairs["radial"],
         whole["centre"][pairs["radar"]],
         foreseen["centre"][pairs["dem"]],
-        Unmatched(*unmatched_share(counted, others[1], dem)),
-        Unmatched(*unmatched_share(expected, others[0], radar)),
+        Unmatched(*unmatched_share(counted, every_predicted, dem)),
+        Unmatched(*unmatched_share(expected, every_seen, radar)),
     ), [*lost, *counts.reasons]
 
 
@@ -94,4 +93,6 @@ def thin(scan_angle_deg: NDArray[np.float64], spacing_deg: float) -> NDArray[np.
     """
     cell = np.round(scan_angle_deg / spacing_deg)
     order = np.lexsort((np.abs(scan_angle_deg - cell * spacing_deg), cell))
-    return np.sort(order[np.diff(cell[order], prepend=-np.inf) > 0])
+    nearest = np.ones(len(order), np.bool_)
+    np.not_equal(cell[order[1:]], cell[order[:-1]], out=nearest[1:])
+    return np.sort(order[nearest])

@@ -74,7 +74,7 @@ class DataSet:
         part = path.with_suffix(".part")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            pq.write_table(table, part, compression="zstd")
+            pq.write_table(table, part, use_dictionary=False)  # of so few rows it makes larger files, and later
             part.replace(path)
         except OSError as error:
             why = error.strerror or error

@@ -24,6 +24,9 @@ LOCAL: Final = {
 SETTINGS: Final = {
     "distributed.worker.multiprocessing-method": "forkserver",
     "distributed.worker.profile.enabled": False,  # it looks at the stacks a hundred times a second
+    "distributed.admin.tick.interval": "1s",  # instead of fifty times a second, in every process
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.worker.memory.monitor-interval": "1s",
 }
 
 
