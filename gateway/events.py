@@ -71,6 +71,8 @@ class IntegrityEvent(Event):
     p_fa: float
     mean_bins: float | None
     mean_stderr_bins: float | None
+    shift: float | None
+    shift_limit: float | None
     unmatched_radar: float | None
     unmatched_radar_limit: float | None
     unmatched_dem: float | None

@@ -50,6 +50,7 @@ class Calibration(BaseModel):
     sigma_bins: float = Field(gt=0)
     rms_bins: float = Field(gt=0)
     variance_factor: float = Field(ge=1)
+    common_error_bins: float | None = Field(None, ge=0)
     unmatched_radar: UnmatchedModel | None = None
     unmatched_dem: UnmatchedModel | None = None
     level: LevelLimits | None = None

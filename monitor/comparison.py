@@ -23,13 +23,15 @@ PAIRINGS: Final[dict[str, Callable[[Any, Any], NDArray[np.void]]]] = {"overlap":
 class Comparison:
     """Both threads of one scan on the radials in use (n,), and their pairs of shadows (N,): for pictures and exports.
 
-    Centres of shadows are in range bins; `pair_radial` is the index of a pair's radial among those in use.
+    Centres of shadows are in range bins; `pair_radial` is the index of a pair's radial among those in use, and
+    `pair_azimuth_rad` that radial's true azimuth.
     """
 
     scan_angle_deg: NDArray[np.float64]
     radar_states: NDArray[np.int8]
     dem_states: NDArray[np.int8]
     pair_radial: NDArray[np.int64]
+    pair_azimuth_rad: NDArray[np.float64]
     radar_centre: NDArray[np.float64]
     dem_centre: NDArray[np.float64]
     unmatched_radar: Unmatched
@@ -42,7 +44,8 @@ class Comparison:
 
     def sample(self, scan: Scan) -> ScanSample:
         """What the tests look at, of the scan that was compared."""
-        return ScanSample(self.disparities, self.unmatched_radar, self.unmatched_dem, signal_level(scan.bins))
+        level = signal_level(scan.bins)
+        return ScanSample(self.disparities, self.pair_azimuth_rad, self.unmatched_radar, self.unmatched_dem, level)
 
 
 def compare(
@@ -79,10 +82,11 @@ def compare(
         radar,
         dem,
         pairs["radial"],
+        scene.pointing.azimuth_rad[pairs["radial"]],
         whole["centre"][pairs["radar"]],
         foreseen["centre"][pairs["dem"]],
-        Unmatched(*unmatched_share(counted, every_predicted, dem)),
-        Unmatched(*unmatched_share(expected, every_seen, radar)),
+        Unmatched(*unmatched_share(counted[counted["size"] >= s.unmatched_size], every_predicted, dem)),
+        Unmatched(*unmatched_share(expected[expected["size"] >= s.unmatched_size], every_seen, radar)),
     ), [*lost, *counts.reasons]
 
 

@@ -1,10 +1,11 @@
 """The tests of one sample, each with its share of the probability of a false alert.
 
-The statistic, T as published or the robust Q, looks at the disparities of pairs. The unmatched shares look at shadows
-without a partner, so they see what is too far off to pair, and may alert where there are too few pairs for the
-statistic. Their shares scatter more than a binomial would, since shadows of a scan stand or fall together: the
-threshold is a quantile of the beta-binomial distribution with the mean m that calibration found, and of the share the
-variance m (1 - m) (1 / n + rho).
+The statistic, T as published or the robust Q, looks at the sizes of the disparities of pairs, and the shift statistic
+at their directions. The unmatched shares look at shadows without a partner, so they see what is too far off to pair,
+and may alert where there are too few pairs for the others; small shadows come and go with the roughness of the ground
+and are not counted. Their shares scatter more than a binomial would, since shadows of a scan stand or fall together:
+the threshold is a quantile of the beta-binomial distribution with the mean m that calibration found, and of the share
+the variance m (1 - m) (1 / n + rho).
 """
 
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from monitor.calibration import Calibration, UnmatchedModel
 from monitor.disparity import minimum_detectable_bias, normalised, robust_statistic, robust_threshold, threshold
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
+from monitor.shift import shift_statistic, shift_threshold
 
 LEAST_RHO = 1e-6  # which is a binomial
 MOST_PAIRS = 1000  # beyond, no further ones would make Q see
@@ -49,6 +51,7 @@ class Findings:
 
     statistic: Test | None = None
     blind: str = ""
+    shift: Test | None = None
     unmatched_radar: Test | None = None
     unmatched_dem: Test | None = None
     t_normalised: float | None = None
@@ -58,7 +61,11 @@ class Findings:
     @property
     def alerts(self) -> list[Test]:
         """The tests that found something wrong."""
-        return [test for test in (self.statistic, self.unmatched_radar, self.unmatched_dem) if test and test.exceeded]
+        return [
+            test
+            for test in (self.statistic, self.shift, self.unmatched_radar, self.unmatched_dem)
+            if test and test.exceeded
+        ]
 
 
 def examine(sample: ScanSample, settings: MonitorSettings, calibration: Calibration) -> Findings:
@@ -70,7 +77,8 @@ def examine(sample: ScanSample, settings: MonitorSettings, calibration: Calibrat
     dem = _unmatched(DEM_SHARE, sample.unmatched_dem, dem_model, each)
     p_fa = _p_fa_of_statistic(settings, calibration)
     if len(d) < settings.pairs_needed:
-        return Findings(None, f"{len(d)} pairs of shadows, {settings.pairs_needed} needed", radar, dem)
+        return Findings(None, f"{len(d)} pairs of shadows, {settings.pairs_needed} needed", None, radar, dem)
+    shift = _shift(sample, settings, calibration)
     q = robust_statistic(d, c.median_bins, c.clip_bins, c.sigma_bins)
     t = normalised(d, c.rms_bins)
     if settings.method == "robust":
@@ -78,10 +86,10 @@ def examine(sample: ScanSample, settings: MonitorSettings, calibration: Calibrat
         most = _most(len(d), c)
         if most <= test.limit:
             blind = f"Q reaches {most:.1f} at most, its threshold is {test.limit:.1f}"
-            return Findings(None, f"{len(d)} pairs cannot alert at P_FA {p_fa:g}: {blind}", radar, dem)
+            return Findings(None, f"{len(d)} pairs cannot alert at P_FA {p_fa:g}: {blind}", shift, radar, dem)
     else:
         test = Test("N T / sigma^2", t, threshold(len(d), p_fa))
-    return Findings(test, "", radar, dem, t, q, minimum_detectable_bias(len(d), c.rms_bins, p_fa, settings.p_md))
+    return Findings(test, "", shift, radar, dem, t, q, minimum_detectable_bias(len(d), c.rms_bins, p_fa, settings.p_md))
 
 
 def pairs_for_verdict(settings: MonitorSettings, calibration: Calibration) -> int:
@@ -100,9 +108,12 @@ def _most(pairs: int, calibration: Calibration) -> float:
 
 
 def _p_fa_of_statistic(settings: MonitorSettings, calibration: Calibration) -> float:
-    """What the unmatched shares leave."""
-    models = (calibration.unmatched_radar, calibration.unmatched_dem) if settings.method == "robust" else ()
-    return settings.p_fa * (1 - settings.unmatched_budget / 2 * sum(model is not None for model in models))
+    """What the other tests leave."""
+    s, c = settings, calibration
+    if s.method == "paper":
+        return s.p_fa
+    unmatched = s.unmatched_budget / 2 * sum(model is not None for model in (c.unmatched_radar, c.unmatched_dem))
+    return s.p_fa * (1 - unmatched - s.shift_budget * (c.common_error_bins is not None))
 
 
 def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> float:
@@ -121,6 +132,16 @@ def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> fl
     of_k = np.exp(ways + betaln(k + a, eligible - k + b) - betaln(a, b))
     more = np.append(np.cumsum(of_k[:0:-1])[::-1], 0.0)  # probability of more than k, small ones summed first
     return float(np.argmax(more <= p_fa) / eligible)
+
+
+def _shift(sample: ScanSample, settings: MonitorSettings, c: Calibration) -> Test | None:
+    p_fa = settings.p_fa * settings.shift_budget
+    if settings.method == "paper" or c.common_error_bins is None or not p_fa:
+        return None
+    found = shift_statistic(
+        sample.disparities, sample.azimuth_rad, c.median_bins, c.clip_bins, c.sigma_bins, c.common_error_bins
+    )
+    return Test("the shift statistic", found, shift_threshold(p_fa))
 
 
 def _unmatched(name: str, found: Unmatched, model: UnmatchedModel | None, p_fa: float) -> Test | None:

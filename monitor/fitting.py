@@ -2,7 +2,8 @@
 
 The fit follows from the heavy tails of real terrain: the median m, a robust spread r (normalised median absolute
 deviation), the clip at +-k r, the root mean square sigma of what the clip leaves, and the variance factor
-c = E[(Q - N)^2] / E[2 N], which is 1 for independent normal disparities and grows with errors common to a scan.
+c = E[(Q - N)^2] / E[2 N], which is 1 for independent normal disparities and grows with errors common to a scan. What
+of those is an error of the position is measured apart, for the test for a shift.
 """
 
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ from monitor.decision import examine
 from monitor.disparity import clipped, robust_statistic
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
+from monitor.shift import common_error
 
 QUARTILE = float(ndtri(0.75))  # of a normal distribution: half of it lies nearer to its median
 LEVELS_LEFT_OUT = 0.5  # percent of the scans at either end
@@ -47,8 +49,9 @@ def fit(
     spread = float(np.median(np.abs(pooled - median)) / QUARTILE)
     if not spread:
         raise ValueError("half of the disparities are equal, so they have no spread: fit to a radar with its noise")
-    sigma = float(np.sqrt(np.mean(clipped(pooled, median, CLIP_FACTOR * spread) ** 2)))
-    q = np.array([robust_statistic(scan.disparities, median, CLIP_FACTOR * spread, sigma) for scan in usable])
+    clip = CLIP_FACTOR * spread
+    sigma = float(np.sqrt(np.mean(clipped(pooled, median, clip) ** 2)))
+    q = np.array([robust_statistic(scan.disparities, median, clip, sigma) for scan in usable])
     n = np.array([len(scan.disparities) for scan in usable])
     made = Calibration(
         name=name,
@@ -60,6 +63,7 @@ def fit(
         sigma_bins=sigma,
         rms_bins=float(np.sqrt(np.mean(pooled**2))),
         variance_factor=max(1.0, float(np.mean((q - n) ** 2) / np.mean(2 * n))),
+        common_error_bins=common_error([(s.disparities, s.azimuth_rad) for s in usable], median, clip, sigma),
         unmatched_radar=_shares([scan.unmatched_radar for scan in usable]),
         unmatched_dem=_shares([scan.unmatched_dem for scan in usable]),
         level=_levels(np.array([scan.level for scan in usable])),

@@ -173,7 +173,7 @@ class Monitor:
     ) -> Verdict:
         """A verdict with every number that there is, once it has settled."""
         settled, why = self._hysteresis.settle(verdict)
-        d, radar, dem = sample.disparities, findings.unmatched_radar, findings.unmatched_dem
+        d, shift, radar, dem = sample.disparities, findings.shift, findings.unmatched_radar, findings.unmatched_dem
         n, test = len(d), findings.statistic
         return Verdict(
             scan=scan,
@@ -187,6 +187,8 @@ class Monitor:
             threshold=test.limit if test else None,
             mean_bins=float(np.mean(d)) if n else None,
             mean_stderr_bins=float(np.std(d, ddof=1) / math.sqrt(n)) if test else None,
+            shift=shift.value if shift else None,
+            shift_limit=shift.limit if shift else None,
             unmatched_radar=sample.unmatched_radar.share,
             unmatched_radar_limit=radar.limit if radar else None,
             unmatched_dem=sample.unmatched_dem.share,

@@ -5,6 +5,7 @@ from typing import Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 SEARCH_STEP_M = 200.0  # shadows of mountains move together over about as far
+MOST_GIVEN = 0.9 + 1e-9  # of p_fa, to other tests than the statistic; with room for rounding
 HeightSource = Literal["076", "370"]
 
 
@@ -24,8 +25,9 @@ class MonitorSettings(BaseModel):
 
     method: Literal["robust", "paper"] = Field("robust", description="which test decides: clipped Q, or T as published")
     p_fa: float = Field(1e-4, gt=0, lt=0.5, description="probability of a false alert in one scan")
+    shift_budget: float = Field(0.4, ge=0, le=0.9, description="share of p_fa that goes to the test for a shift")
     unmatched_budget: float = Field(
-        0.5, ge=0, le=0.9, description="share of p_fa that goes to the tests of unmatched shadows, half to each thread"
+        0.3, ge=0, le=0.9, description="share of p_fa that goes to the tests of unmatched shadows, half to each thread"
     )
     window_scans: int = Field(
         1, ge=1, le=30, description="scans whose pairs may be gathered where one has too few for a verdict"
@@ -57,6 +59,9 @@ class MonitorSettings(BaseModel):
     radial_spacing_deg: float = Field(3.0, ge=0.01, le=30, description="one radial in every so many degrees enters T")
     minimum_size: int = Field(3, ge=1, le=65_536, description="smallest shadow used, range bins")
     maximum_size: int | None = Field(None, ge=1, le=65_536, description="largest shadow used, range bins")
+    unmatched_size: int = Field(
+        8, ge=1, le=65_536, description="smallest shadow whose lack of a partner is counted, range bins"
+    )
     minimum_width_deg: float = Field(
         0.0, ge=0, le=180, description="a shadow counts if overlapping ones of neighbouring radials reach so far across"
     )
@@ -99,6 +104,12 @@ class MonitorSettings(BaseModel):
     def _some_shadow_has_a_size(self) -> Self:
         if self.maximum_size is not None and self.maximum_size < self.minimum_size:
             raise ValueError(f"maximum_size {self.maximum_size} is below minimum_size {self.minimum_size}")
+        return self
+
+    @model_validator(mode="after")
+    def _something_is_left_for_the_statistic(self) -> Self:
+        if (given := self.shift_budget + self.unmatched_budget) > MOST_GIVEN:
+            raise ValueError(f"shift_budget and unmatched_budget are {given:g} together: leave Q a tenth of p_fa")
         return self
 
     @model_validator(mode="after")

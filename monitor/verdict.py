@@ -10,8 +10,9 @@ class Verdict:
     """The answer for one scan, and the numbers behind it. Disparities are in range bins.
 
     `scans` is how many scans the pairs are from. `threshold` is that of the method's statistic, Q or N T / sigma^2.
-    `mdb_bins` is the minimum detectable bias of the published test, with the plain rms of the calibration. The limits
-    of the unmatched shares are there with a calibration that has them. `offset_...` is `offset.Offset`, of an alert.
+    `mdb_bins` is the minimum detectable bias of the published test, with the plain rms of the calibration. `shift`, its
+    limit and those of the unmatched shares are there with a calibration that has what they need. `offset_...` is
+    `offset.Offset`, of an alert.
     """
 
     scan: int
@@ -25,6 +26,8 @@ class Verdict:
     threshold: float | None
     mean_bins: float | None
     mean_stderr_bins: float | None
+    shift: float | None
+    shift_limit: float | None
     unmatched_radar: float | None
     unmatched_radar_limit: float | None
     unmatched_dem: float | None

@@ -74,7 +74,7 @@ def _false_alerts(fitted: Sequence[Flown], flown: Sequence[Flown], calibrations:
         measured += false_alerts.rows(f"{name}, by {WHITE_MOUNTAINS}", scans, ways)
         level = home.level
         valid = [scan for scan in scans if level and level.lowest <= scan.level <= level.highest]
-        default = {"Q and the unmatched shares": ways["Q and the unmatched shares"]}
+        default = {false_alerts.DEFAULT: ways[false_alerts.DEFAULT]}
         measured += false_alerts.rows(f"the same, where the level check lets {len(valid)} pass", valid, default)
     return (
         f"## How often it alerts when nothing is wrong\n\n{len(flown)} flights of {FAULT_FREE_SCANS} scans of 4.6 s, "
@@ -91,7 +91,7 @@ def _detection(everywhere: Sequence[Kind], calibrations: dict[str, Calibration])
         f"## What it finds\n\n{len(flown)} flights of 3 scans, each judged under every fault; P_FA {detection.P_FA:g}. "
         f"Counted are flights\nwith at least {detection.ENOUGH_PAIRS} pairs in one of their first two scans without a "
         "fault, and alerts within two scans.\nShifts go to eight directions in turn. Each test alone has the whole "
-        "P_FA (the unmatched shares nine tenths);\nthe default splits it.\n\n"
+        "P_FA (shift and\nunmatched shares nine tenths); the default splits it.\n\n"
         + detection.by_fault(flown, calibrations)
         + "\n\nSingle scans over shifted terrain by their number of pairs, and the minimum detectable bias that the "
         "published test\npromises at P_MD 0.001 with the calibrated rms:\n\n" + detection.by_pairs(flown, calibrations)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from benchmarks.evidence.faults import FAULTS, NONE, SCAN_S
-from benchmarks.evidence.flown import Flown
+from benchmarks.evidence.flown import TERRAINS, Flown
 from benchmarks.evidence.tables import share, table
 from monitor.calibration import Calibration
 from monitor.decision import Findings, examine
@@ -21,19 +21,21 @@ WITHIN = 2  # scans
 BIN_M = 10 * 1852 / 512
 PAIRS = ((20, 30), (30, 45), (45, 62))
 SHIFTS_M = (50, 100, 200, 500)
-WAYS = ("T as published", "Q", "unmatched", "mean", "default")
+WAYS = ("T as published", "Q", "shift", "unmatched", "mean", "default")
 
 
 def _by_test(scan: ScanSample, calibration: Calibration) -> dict[str, bool]:
     """What each test alone, at the whole P_FA, and the default say."""
     paper = examine(scan, MonitorSettings(p_fa=P_FA, method="paper"), calibration)
-    alone = examine(scan, MonitorSettings(p_fa=P_FA, unmatched_budget=0.0), calibration)
-    shares = examine(scan, MonitorSettings(p_fa=P_FA, unmatched_budget=0.9), calibration)
+    alone = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_budget=0.0), calibration)
+    shift = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.9, unmatched_budget=0.0), calibration)
+    shares = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_budget=0.9), calibration)
     default = examine(scan, MonitorSettings(p_fa=P_FA), calibration)
     unmatched = [test for test in (shares.unmatched_radar, shares.unmatched_dem) if test]
     verdicts = (
         bool(paper.alerts),
         _statistic(alone),
+        shift.shift is not None and shift.shift.exceeded,
         any(test.exceeded for test in unmatched),
         _mean(scan, calibration),
         bool(default.alerts),
@@ -56,23 +58,33 @@ def _mean(scan: ScanSample, calibration: Calibration) -> bool:
 
 def by_fault(flown: Sequence[Flown], calibrations: dict[str, Calibration]) -> str:
     """A row for each fault: the share of flights found within two scans by each test, and when the default finds it."""
+    enough = [
+        flight
+        for flight in flown
+        if max(len(scan.disparities) for scan in flight.samples[NONE.name][:WITHIN]) >= ENOUGH_PAIRS
+    ]
     rows = []
     for fault in FAULTS:
-        enough = [
-            flight
-            for flight in flown
-            if max(len(scan.disparities) for scan in flight.samples[NONE.name][:WITHIN]) >= ENOUGH_PAIRS
-        ]
         said = [
             [_by_test(scan, calibrations[flight.kind.terrain]) for scan in flight.samples[fault.name]]
             for flight in enough
         ]
-        shares = [sum(any(scan[way] for scan in scans[:WITHIN]) for scans in said) for way in WAYS]
+        shares = [_found(said, way) for way in WAYS]
+        over = [
+            _found(
+                [scans for scans, flight in zip(said, enough, strict=True) if flight.kind.terrain == name], "default"
+            )
+            for name in TERRAINS
+        ]
         first = [next((k for k, scan in enumerate(scans) if scan["default"]), None) for scans in said]
         found = sorted(k for k in first if k is not None)
         soon = f"{SCAN_S * (found[len(found) // 2] + 1):.0f} s" if found else ""
-        rows.append([fault.name.removesuffix(" 0"), *(share(count, len(said)) for count in shares), soon])
-    return table(["fault", *WAYS, "median time to alert"], rows)
+        rows.append([fault.name.removesuffix(" 0"), *shares, *over, soon])
+    return table(["fault", *WAYS, *(f"default, {name}" for name in TERRAINS), "median time to alert"], rows)
+
+
+def _found(flights: Sequence[Sequence[dict[str, bool]]], way: str) -> str:
+    return share(sum(any(scan[way] for scan in scans[:WITHIN]) for scans in flights), len(flights))
 
 
 def by_pairs(flown: Sequence[Flown], calibrations: dict[str, Calibration]) -> str:

@@ -15,11 +15,14 @@ from monitor.disparity import robust_statistic
 from monitor.fitting import fit
 from monitor.sample import ScanSample
 from monitor.settings import MonitorSettings
+from monitor.shift import shift_statistic, shift_threshold
 
 P_FAS = (1e-1, 1e-2, 1e-3)
 MINIMUM_PAIRS = 16
 DRAWS = 20_000
 SIGNIFICANCE = 0.01
+
+DEFAULT = "the default: Q, shift and unmatched shares"
 
 Alerts = Callable[[ScanSample, float], bool]
 
@@ -41,8 +44,9 @@ def tests(calibration: Calibration, pool: Sequence[ScanSample]) -> dict[str, Ale
     """Each way to decide, by name."""
     return {
         "T as published": _decision(calibration, method="paper"),
-        "Q": _decision(calibration, unmatched_budget=0.0),
-        "Q and the unmatched shares": _decision(calibration),
+        "Q": _decision(calibration, shift_budget=0.0, unmatched_budget=0.0),
+        DEFAULT: _decision(calibration),
+        "the shift statistic alone": Shift(calibration),
         "Q against a bootstrap": Bootstrap(calibration, pool),
     }
 
@@ -53,6 +57,21 @@ def _decision(calibration: Calibration, **options: str | float) -> Alerts:
         return bool(examine(scan, settings, calibration).alerts)
 
     return alerts
+
+
+class Shift:
+    """The shift statistic with the whole probability of a false alert."""
+
+    def __init__(self, calibration: Calibration) -> None:
+        self._calibration = calibration
+
+    def __call__(self, scan: ScanSample, p_fa: float) -> bool:
+        """Whether it exceeds its threshold."""
+        c, common = self._calibration, self._calibration.common_error_bins
+        if common is None:
+            raise ValueError(f"calibration {c.name} has no common error: fit one")
+        d, azimuth = scan.disparities, scan.azimuth_rad
+        return shift_statistic(d, azimuth, c.median_bins, c.clip_bins, c.sigma_bins, common) > shift_threshold(p_fa)
 
 
 class Bootstrap:

@@ -73,6 +73,8 @@ VERDICTS = pa.schema(
                 "threshold",
                 "mean_bins",
                 "mean_stderr_bins",
+                "shift",
+                "shift_limit",
                 "unmatched_radar",
                 "unmatched_radar_limit",
                 "unmatched_dem",

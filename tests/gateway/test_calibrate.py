@@ -143,7 +143,9 @@ def made(name: str, begins_utc_ns: int, *scans: Compared, p_fa: float = 1e-4, re
 def scan(value: float, range_nm: float = 10.0) -> Compared:
     """Twenty disparities about a value, which tells one scan from another."""
     d = value + np.tile([-2.0, -1.0, 1.0, 2.0], 5)
-    return Compared(512, range_nm, ScanSample(d, Unmatched(2, 10), Unmatched(2, 10), 3.0), (d,) * len(CELLS))
+    return Compared(
+        512, range_nm, ScanSample(d, np.zeros(len(d)), Unmatched(2, 10), Unmatched(2, 10), 3.0), (d,) * len(CELLS)
+    )
 
 
 def test_the_commonest_radar_setting_is_calibrated_in_order_of_time_and_the_rest_counted() -> None:

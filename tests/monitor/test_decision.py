@@ -18,15 +18,16 @@ CALIBRATION = Calibration(
     sigma_bins=2.0,
     rms_bins=4.0,
     variance_factor=1.0,
+    common_error_bins=0.5,
     unmatched_radar=MODEL,
     unmatched_dem=MODEL,
 )
-BARE = CALIBRATION.model_copy(update={"unmatched_radar": None, "unmatched_dem": None})
+BARE = CALIBRATION.model_copy(update={"common_error_bins": None, "unmatched_radar": None, "unmatched_dem": None})
 FEW, MANY = Unmatched(10, 50), Unmatched(45, 50)
 
 
 def sample(n: int = 40, d: float = 1.0, radar: Unmatched = FEW, dem: Unmatched = FEW) -> ScanSample:
-    return ScanSample(np.full(n, d), radar, dem, 2.0)
+    return ScanSample(np.full(n, d), np.linspace(-np.pi, np.pi, n), radar, dem, 2.0)
 
 
 @pytest.mark.parametrize("eligible", [2, 3, 5, 8, 20, 60, 200])
@@ -62,11 +63,13 @@ def test_a_share_of_few_shadows_cannot_exceed_its_threshold() -> None:
 
 
 def test_the_probability_of_a_false_alert_is_split_among_the_tests() -> None:
-    settings = MonitorSettings(p_fa=1e-3, unmatched_budget=0.4)
+    settings = MonitorSettings(p_fa=1e-3, shift_budget=0.5, unmatched_budget=0.4)
     found = examine(sample(), settings, CALIBRATION)
     assert found.statistic is not None
+    assert found.shift is not None
     assert found.unmatched_radar is not None
-    assert found.statistic.limit == pytest.approx(chi2.isf(0.6e-3, 40))
+    assert found.statistic.limit == pytest.approx(chi2.isf(0.1e-3, 40))
+    assert found.shift.limit == pytest.approx(chi2.isf(0.5e-3, 2))
     assert found.unmatched_radar.limit == unmatched_threshold(50, MODEL, 0.2e-3)
 
 
@@ -75,7 +78,7 @@ def test_the_probability_of_a_false_alert_is_split_among_the_tests() -> None:
     [
         (MonitorSettings(p_fa=1e-3, method="paper"), CALIBRATION),
         (MonitorSettings(p_fa=1e-3), BARE),
-        (MonitorSettings(p_fa=1e-3, unmatched_budget=0), CALIBRATION),
+        (MonitorSettings(p_fa=1e-3, shift_budget=0, unmatched_budget=0), CALIBRATION),
     ],
 )
 def test_the_statistic_has_it_all_where_it_is_the_only_test(
@@ -95,6 +98,13 @@ def test_unmatched_shadows_alert_alone_where_there_are_too_few_pairs_for_the_sta
     assert [test.name for test in found.alerts] == [RADAR_SHARE]
     assert [test.name for test in examine(sample(dem=MANY), settings, CALIBRATION).alerts] == [DEM_SHARE]
     assert str(found.alerts[0]).startswith("the unmatched share of radar shadows 0.9 exceeds 0.")
+
+
+def test_disparities_that_follow_the_cosine_of_the_azimuth_alert_where_their_squares_do_not() -> None:
+    shifted = sample()._replace(disparities=3 * np.cos(sample().azimuth_rad))
+    found = examine(shifted, MonitorSettings(p_fa=1e-3), CALIBRATION)
+    assert [test.name for test in found.alerts] == ["the shift statistic"]
+    assert not examine(shifted, MonitorSettings(p_fa=1e-3), BARE).alerts
 
 
 def test_q_and_t_are_both_told_whatever_decides() -> None:
