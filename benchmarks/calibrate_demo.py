@@ -33,6 +33,7 @@ def main() -> None:
         "250 to 500 m above the highest ground below, median signal-to-noise ratio 18 dB at 5 to 10 NM",
         bins=512,
         range_nm=base.radar.range_nm,
+        radar_profile=base.radar.payload,
     )
     CALIBRATION.write_text(made.model_dump_json(indent=2) + "\n")
     print(made.model_dump_json(indent=2))

@@ -219,7 +219,7 @@ class Pipeline:
             if count := int(np.count_nonzero(unusual >> bit & 1)):
                 radials.link.counters[f"words_708_{name}"] += count
         self._compare_with_command(radials.link, radials.times_ns.tolist(), unpacked)
-        return [*self._scans.feed(radials.times_ns, unpacked)]
+        return [*self._scans.feed(radials.times_ns, unpacked, radials.channel.profile.name)]
 
     def _compare_with_command(self, link: Link, times_ns: list[int], radials: Radials) -> None:
         if not self._echo.listens:

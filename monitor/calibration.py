@@ -45,6 +45,7 @@ class Calibration(BaseModel):
     provenance: str
     bins: int | None = None
     range_nm: float | None = None
+    radar_profile: str | None = None
     median_bins: float
     spread_bins: float = Field(gt=0)
     sigma_bins: float = Field(gt=0)
@@ -61,8 +62,8 @@ class Calibration(BaseModel):
         """The largest deviation from the median that counts in full."""
         return CLIP_FACTOR * self.spread_bins
 
-    def mismatch(self, bins: int, range_nm: float) -> str | None:
-        """Why the calibration does not hold for a scan, or None."""
+    def mismatch(self, bins: int, range_nm: float, profile: str) -> str | None:
+        """Why the calibration does not hold for a scan, or None. Of a profile "" nothing is known."""
         if self.bins not in (None, bins):
             return f"calibration {self.name} is for {self.bins} range bins, the radar sends {bins}: {MEND}"
         if self.range_nm not in (None, range_nm):
@@ -70,6 +71,8 @@ class Calibration(BaseModel):
                 f"calibration {self.name} is for a range of {self.range_nm:g} NM, the radar is set to {range_nm:g} NM: "
                 f"{MEND}"
             )
+        if profile and self.radar_profile not in (None, profile):
+            return f"calibration {self.name} is for radar profile {self.radar_profile}, this one is {profile}: {MEND}"
         return None
 
 

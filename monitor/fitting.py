@@ -33,6 +33,7 @@ def fit(
     provenance: str,
     bins: int | None = None,
     range_nm: float | None = None,
+    radar_profile: str | None = None,
 ) -> Calibration:
     """Fit to fault-free scans, and count on other scans how often each P_FA would have alerted.
 
@@ -58,6 +59,7 @@ def fit(
         provenance=provenance,
         bins=bins,
         range_nm=range_nm,
+        radar_profile=radar_profile,
         median_bins=median,
         spread_bins=spread,
         sigma_bins=sigma,

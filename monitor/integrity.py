@@ -34,7 +34,7 @@ from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
 from monitor.water import Water, WaterError, WaterFiles
 from monitor.window import Window
 
-MOST_UNMATCHED = 0.6  # share of shadows; without a calibration more of them forbid an ok
+MOST_UNMATCHED = 0.5  # share of shadows; without a calibration more of them forbid an ok
 FLOWN_M = 2000.0  # farther than an aircraft flies between a radial in use and one that is not
 
 
@@ -120,7 +120,8 @@ class Monitor:
             return f"radar reports faults: bits {scan.faults:07b} of the header's 18 to 24, the first at the right"
         if bits := misread_bits(scan.bins):
             return f"the range bins look like {bits} bits each: check radar_profile, or the channel's profile"
-        return self.calibration.mismatch(scan.bins.shape[1], scan.range_nm) if self.calibration else None
+        calibration = self.calibration
+        return calibration.mismatch(scan.bins.shape[1], scan.range_nm, scan.profile) if calibration else None
 
     def _reach_m(self, scan: Scan) -> float:
         """How far from the radials in use the terrain of a scan may be looked at, moved about and on all radials."""

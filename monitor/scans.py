@@ -72,6 +72,7 @@ class Scan:
     missing: int
     repeated: int
     cut_off: int = 0  # radials that the whole sweep before had at the ends, and this whole sweep has not
+    profile: str = ""  # by whose name its words were read, if that is known
 
     @property
     def sector_deg(self) -> tuple[float, float]:
@@ -125,17 +126,19 @@ class ScanBuilder:
         self.number = 0
         self._sweep = np.zeros(1, SWEEP)
         self._blocks: list[tuple[NDArray[Any], ...]] = []  # of its radials: time, scan angle, annunciations, bins
+        self._profile = ""  # of its newest radials
         self._began_whole = False
         self._before: Scan | None = None  # the last sweep that was whole, if it is the one before
 
-    def feed(self, time_ns: NDArray[np.int64], radials: Radials) -> Iterator[Scan]:
-        """Take radials (n,) in order of time; give the scans that they complete."""
+    def feed(self, time_ns: NDArray[np.int64], radials: Radials, profile: str = "") -> Iterator[Scan]:
+        """Take radials (n,) in order of time, read by a profile of that name; give the scans that they complete."""
         columns = (time_ns, radials.scan_angle_deg, radials.annunciations, radials.bins)
         begin = 0
         while begin < len(time_ns):
             end, whole = _add(self._sweep, begin, time_ns, radials)
             if end > begin:
                 self._blocks.append(tuple(column[begin:end] for column in columns))
+                self._profile = profile
             if end < len(time_ns):
                 yield self._close(whole)
             begin = end
@@ -170,6 +173,7 @@ class ScanBuilder:
             int(sweep["faults"]),
             missing=int(np.sum(np.maximum(np.round((moving - TREMBLE_DEG) / usual) - 1, 0))) if usual else 0,
             repeated=int(max(len(steps) - len(moving), rested)),
+            profile=self._profile,
         )
         if whole and self._began_whole:
             if self._before and usual:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gateway.calibrate.page import Histogram
-from gateway.calibrate.recorded import CELLS, LARGEST_SIZES, SHARES_OF_RANGE, Compared, Read
+from gateway.calibrate.recorded import CELLS, LARGEST_SIZES, SHARES_OF_RANGE, Compared, Read, Setting
 from gateway.console import utc
 from gateway.errors import GatewayError
 from monitor.calibration import Calibration
@@ -31,23 +31,22 @@ to the size and range limit are paired by their overlap, at most one pair a radi
 class Material(NamedTuple):
     """The scans of one radar setting, in order of time, and what was left out."""
 
-    bins: int
-    range_nm: float
+    setting: Setting
     scans: list[Compared]
     left_out: int
 
 
 def material(reads: Sequence[Read]) -> Material:
     """The scans of the commonest setting. Raises GatewayError, with what to fly, if no scan was compared."""
-    settings = Counter((scan.bins, scan.range_nm) for read in reads for scan in read.scans)
+    settings = Counter(scan.setting for read in reads for scan in read.scans)
     if not settings:
         refusals = sum((read.refusals for read in reads), Counter[str]())
         why = "; ".join(f"{count} scans: {reason}" for reason, count in refusals.most_common(3)) or "no scan at all"
         raise GatewayError(f"no scan of these recordings can be compared with the terrain ({why}): {FLY}")
-    (bins, range_nm), count = settings.most_common(1)[0]
+    setting, count = settings.most_common(1)[0]
     in_time = sorted(reads, key=lambda read: read.begins_utc_ns or 0)
-    scans = [scan for read in in_time for scan in read.scans if (scan.bins, scan.range_nm) == (bins, range_nm)]
-    return Material(bins, range_nm, scans, settings.total() - count)
+    scans = [scan for read in in_time for scan in read.scans if scan.setting == setting]
+    return Material(setting, scans, settings.total() - count)
 
 
 def table(found: Material) -> list[list[str]]:
@@ -57,7 +56,7 @@ def table(found: Material) -> list[list[str]]:
         values = np.concatenate([scan.centres[k] for scan in found.scans])
         count, mean, sigma = moments(values)
         figures = (text(mean, ".2f"), text(sigma, ".2f"), text(normality(values), ".2g"))
-        rows.append([f"{share * found.range_nm:g}", f"1-{size}", f"{count}", *figures])
+        rows.append([f"{share * found.setting.range_nm:g}", f"1-{size}", f"{count}", *figures])
     return rows
 
 
@@ -70,7 +69,7 @@ def histograms(found: Material) -> list[Histogram]:
     """The residuals of the widest class of sizes, for each range limit."""
     return [
         Histogram(
-            f"up to {share * found.range_nm:g} NM, 1-{LARGEST_SIZES[0]} bins",
+            f"up to {share * found.setting.range_nm:g} NM, 1-{LARGEST_SIZES[0]} bins",
             np.concatenate([scan.centres[CELLS.index((share, LARGEST_SIZES[0]))] for scan in found.scans]),
         )
         for share in SHARES_OF_RANGE
@@ -104,8 +103,7 @@ def calibration(name: str, reads: Sequence[Read], found: Material, least_scans: 
             settings,
             name=name,
             provenance=_provenance(reads, found, len(usable)),
-            bins=found.bins,
-            range_nm=found.range_nm,
+            **found.setting._asdict(),
         )
     except ValueError as error:
         raise GatewayError(f"these recordings give no calibration: {error}") from error

@@ -27,11 +27,21 @@ SHARES_OF_RANGE = (1.0, 0.5, 0.25)  # of the range setting; 20, 10 and 5 NMI of 
 CELLS = tuple((share, size) for share in SHARES_OF_RANGE for size in LARGEST_SIZES)
 
 
-class Compared(NamedTuple):
-    """A scan of so many bins and range: what the tests look at in flight, and residuals of centres for each cell."""
+class Setting(NamedTuple):
+    """What a calibration is for."""
 
     bins: int
     range_nm: float
+    radar_profile: str
+
+    def __str__(self) -> str:
+        return f"{self.bins} bins, {self.range_nm:g} NM and profile {self.radar_profile}"
+
+
+class Compared(NamedTuple):
+    """A scan of one radar setting: what the tests look at in flight, and residuals of centres for each cell."""
+
+    setting: Setting
     sample: ScanSample
     centres: tuple[NDArray[np.float64], ...]
 
@@ -89,7 +99,7 @@ def _compared(scan: Scan, comparison: Comparison) -> Compared:
         limit = int(share * bins)
         radar, dem = comparison.radar_states[:, :limit], comparison.dem_states[:, :limit]
         centres.append(residuals(radar, dem, (1, size), "overlap").centre)
-    return Compared(bins, scan.range_nm, comparison.sample(scan), tuple(centres))
+    return Compared(Setting(bins, scan.range_nm, scan.profile), comparison.sample(scan), tuple(centres))
 
 
 def _digest(recording: Recording) -> str:

@@ -47,7 +47,7 @@ def calibrate_radar(
     rows = table(found)
     print_table(HEADINGS, rows)
     if found.left_out:
-        typer.echo(f"{found.left_out} scans left out: not of {found.bins} bins and {found.range_nm:g} NM")
+        typer.echo(f"{found.left_out} scans left out: not of {found.setting}")
     made = calibration(output.stem, reads, found, least_scans)
     output.write_text(made.model_dump_json(indent=2) + "\n", encoding="utf-8")
     for rate in made.checked:

@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from gateway.calibrate.dem import as_published, figures, monte_carlo, setup_of
 from gateway.calibrate.radar import calibration, material
-from gateway.calibrate.recorded import CELLS, Compared, Read, read
+from gateway.calibrate.recorded import CELLS, Compared, Read, Setting, read
 from gateway.calibrate.workers import on_all_cores
 from gateway.cli import app
 from gateway.errors import GatewayError
@@ -143,14 +143,13 @@ def made(name: str, begins_utc_ns: int, *scans: Compared, p_fa: float = 1e-4, re
 def scan(value: float, range_nm: float = 10.0) -> Compared:
     """Twenty disparities about a value, which tells one scan from another."""
     d = value + np.tile([-2.0, -1.0, 1.0, 2.0], 5)
-    return Compared(
-        512, range_nm, ScanSample(d, np.zeros(len(d)), Unmatched(2, 10), Unmatched(2, 10), 3.0), (d,) * len(CELLS)
-    )
+    sample = ScanSample(d, np.zeros(len(d)), Unmatched(2, 10), Unmatched(2, 10), 3.0)
+    return Compared(Setting(512, range_nm, "arinc708"), sample, (d,) * len(CELLS))
 
 
 def test_the_commonest_radar_setting_is_calibrated_in_order_of_time_and_the_rest_counted() -> None:
     found = material([made("late", 20, scan(3), scan(4)), made("early", 10, scan(1, 20.0), scan(2))])
-    assert (found.bins, found.range_nm, found.left_out) == (512, 10.0, 1)
+    assert (found.setting, found.left_out) == (Setting(512, 10.0, "arinc708"), 1)
     assert [float(np.mean(s.sample.disparities)) for s in found.scans] == [2.0, 3.0, 4.0]
 
 

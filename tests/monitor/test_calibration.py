@@ -81,14 +81,19 @@ def test_a_file_that_is_missing_or_no_json_is_named(tmp_path: Path) -> None:
 
 def test_a_calibration_says_for_which_radar_it_holds() -> None:
     made = WHOLE
-    assert made.mismatch(512, 10.0) is None
-    assert "calibration none is for 512 range bins, the radar sends 256" in str(made.mismatch(256, 10.0))
-    assert "range of 10 NM, the radar is set to 20 NM" in str(made.mismatch(512, 20.0))
+    assert made.mismatch(512, 10.0, "arinc708") is None
+    assert "calibration none is for 512 range bins, the radar sends 256" in str(made.mismatch(256, 10.0, ""))
+    assert "range of 10 NM, the radar is set to 20 NM" in str(made.mismatch(512, 20.0, ""))
+    profiled = made.model_copy(update={"radar_profile": "arinc708"})
+    assert profiled.mismatch(512, 10.0, "arinc708") is None
+    assert profiled.mismatch(512, 10.0, "") is None
+    said = str(profiled.mismatch(512, 10.0, "rdr4000"))
+    assert "is for radar profile arinc708, this one is rdr4000: load one that was made for it" in said
 
 
 def test_the_stated_defaults_are_the_same_share_of_the_range_setting_for_any_number_of_bins() -> None:
     fine, coarse = uncalibrated(512), uncalibrated(256)
-    assert coarse.mismatch(256, 20.0) is None
+    assert coarse.mismatch(256, 20.0, "") is None
     for name in ("spread_bins", "sigma_bins", "rms_bins", "clip_bins"):
         assert getattr(fine, name) == 2 * getattr(coarse, name)
     assert fine.variance_factor == coarse.variance_factor

@@ -215,7 +215,7 @@ def test_without_a_calibration_nothing_is_ok_that_t_or_the_unmatched_shares_cont
     assert "without a calibration no ok: N T / sigma^2" in verdict.reasons[0]
 
     alone = replace(honest, bins=np.where(np.arange(512) % 100 == 99, 0, honest.bins))
-    alone.bins[:, 4:] *= np.arange(508) // 5 % 2 == 1  # small shadows everywhere that no terrain casts
+    alone.bins[:, 4:] *= np.arange(508) // 10 % 2 == 1  # shadows everywhere that no terrain casts
     verdict, _ = judge(white_mountains, alone, calibration=None, settings=MonitorSettings(minimum_pairs=2, p_fa=0.01))
     assert verdict.verdict != "ok"
     assert any("unmatched share of radar shadows" in reason for reason in verdict.reasons)

@@ -61,5 +61,5 @@ def test_narrow_shadows_of_either_thread_do_not_count_and_are_told(white_mountai
     assert (after.unmatched_radar, after.unmatched_dem) == (before.unmatched_radar, before.unmatched_dem)
     radar, terrain = (int(word) for word in said.split() if word.isdecimal() and word != "6")
     assert after.reasons == (f"{radar + 1} radar and {terrain} terrain shadows do not count: narrower than 6 degrees",)
-    unscreened = judge(white_mountains, replace(honest, bins=speckled))[0]
+    unscreened = judge(white_mountains, replace(honest, bins=speckled), settings=MonitorSettings(unmatched_size=4))[0]
     assert unscreened.unmatched_radar is not None and unscreened.unmatched_radar > 0
