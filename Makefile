@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test rig-test lint bench evidence latency load full-load hours soak crash agreement cold-start wide-terrain
+.PHONY: demo test rig-test lint bench live evidence latency load full-load hours soak crash agreement cold-start wide-terrain
 .PHONY: rebaseline calibration dbc setup lock clean
 
 demo: $(READY)
@@ -25,10 +25,15 @@ lint: $(READY)
 
 bench: $(READY)
 	$(BIN)/pytest benchmarks --benchmark-enable --benchmark-only
+	$(BIN)/python -m benchmarks.live
 
 # What the monitor's numbers are worth, into docs/evidence.md; half an hour on two cores.
 evidence: $(READY)
 	$(BIN)/python -m benchmarks.evidence
+
+# How long the gateway computes from a radial that came in to its verdicts; the end of `make bench`.
+live: $(READY)
+	$(BIN)/python -m benchmarks.live
 
 # Time from a full scan on the line to its verdict, at real bus rates.
 latency: $(READY)
