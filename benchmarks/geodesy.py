@@ -22,7 +22,7 @@ def section() -> list[str]:
     pyproj, pymap3d_ = f"pyproj {version('pyproj')}", f"pymap3d {version('pymap3d')}"
     lines = [
         f"Beside {pyproj} and {pymap3d_}: {DRAWN} drawn places up to {HIGHEST_LATITUDE_DEG:g} degrees from the",
-        "equator, azimuths, and distances up to each range setting, on the ellipsoid, for neither knows a surface above",
+        "equator, azimuths, and distances up to each range setting, on the ellipsoid, as neither knows a surface above",
         "it. One has Karney's series, the other Vincenty's; the claim is a millimetre.",
         "",
         f"| range setting | largest distance from {pyproj} | from {pymap3d_} | the two from each other | claim |",
