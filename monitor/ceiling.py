@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from monitor.geodesy import Ray, along
+from monitor.geodesy import Ray, along, bend
 
 BLOCK = 4  # posts: with eight a third fewer bins are left out, with two more is spent than saved
 NEAR = BLOCK - 1.01  # a cell fewer than a block: ground within so many posts of a place has its posts in the nine
@@ -40,8 +40,8 @@ def clear_m(
     That holds for ground at s were it anywhere within `tolerance_m` of s. No post up to there is void or missing.
     Stretches are tried in turn, so long that their ends lie within `NEAR` posts of the middle.
     """
-    bend = 2 * max(abs(track.lat2), abs(track.lon2)) + 3 * max(abs(track.lat3), abs(track.lon3)) * farthest_m
-    half = NEAR / (max(abs(track.lat1), abs(track.lon1)) + bend * farthest_m)
+    steepest = max(abs(track.lat1), abs(track.lon1))
+    half = NEAR / (steepest + bend(track, farthest_m + NEAR / steepest))
     s = 0.0
     while s < farthest_m:
         row, column = along(track, s + half)

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from monitor.ceiling import clear_m
-from monitor.geodesy import Ray, along, curvature_radii, ray
+from monitor.geodesy import Ray, along, bend, curvature_radii, ray
 from monitor.settings import MonitorSettings
 from monitor.shade import DEM_INITIAL, walk
 from monitor.terrain import Grid, bilinear, blend, corners, locate, sample
@@ -174,7 +174,7 @@ def _look(post_m, track, height_m, below_m, bins, begin):  # type: ignore[no-unt
     Several plain loops, because each goes four bins at a time where one loop over all of it would go bin by bin; all
     count from 0, or numba would ask of each index whether it is negative.
     """
-    inside = _inside(track, bins.levels_m[-1][-1], post_m.shape)
+    inside = stays_inside(track, bins.levels_m[-1][-1], post_m.shape)
     bins.places[0, 0] = below_m
     known = 1
     for level in range(len(LEVELS)):
@@ -218,15 +218,15 @@ def _heights(post_m, track, distance, inside, bins, ground):  # type: ignore[no-
 
 
 @njit(cache=True)
-def _inside(track, far_m, shape):  # type: ignore[no-untyped-def] # typed by tangents
-    """Whether a ray in posts surely stays in the grid: its ends do, by more than it can bend, and its start by more."""
-    bend = far_m**2 * (max(abs(track.lat2), abs(track.lon2)) + max(abs(track.lat3), abs(track.lon3)) * far_m) + 0.001
+def stays_inside(track: Ray, far_m: float, shape: tuple[int, int]) -> bool:
+    """Whether a ray in posts surely stays in the grid up to a distance: its tangent at the start does, by the bend."""
+    aside = far_m * bend(track, far_m) + 0.001
     row, column = track.lat0 + track.lat1 * far_m, track.lon0 + track.lon1 * far_m
-    return (
-        (min(row, track.lat0) > bend)
-        & (min(column, track.lon0) > bend)
-        & (max(row, track.lat0) < shape[0] - 1 - bend)
-        & (max(column, track.lon0) < shape[1] - 1 - bend)
+    return bool(
+        (min(row, track.lat0) > aside)
+        & (min(column, track.lon0) > aside)
+        & (max(row, track.lat0) < shape[0] - 1 - aside)
+        & (max(column, track.lon0) < shape[1] - 1 - aside)
     )
 
 
@@ -264,6 +264,8 @@ def _in_posts(grid: Grid, r: Ray) -> Ray:
     """The ray in rows and columns of the grid where it has degrees of latitude and longitude."""
     south, east = -1 / grid.row_deg, 1 / grid.column_deg
     return Ray(
-        (r.lat0 - grid.north_deg) * south, r.lat1 * south, r.lat2 * south, r.lat3 * south,
-        (r.lon0 - grid.west_deg) * east, r.lon1 * east, r.lon2 * east, r.lon3 * east,
+        (r.lat0 - grid.north_deg) * south,
+        r.lat1 * south, r.lat2 * south, r.lat3 * south, r.lat4 * south, r.lat5 * south,
+        (r.lon0 - grid.west_deg) * east,
+        r.lon1 * east, r.lon2 * east, r.lon3 * east, r.lon4 * east, r.lon5 * east,
     )  # fmt: skip

@@ -1,6 +1,7 @@
-"""Ceilings: never below the ground near them, and states with them are those without."""
+"""Ceilings: never below the ground near them, and states with them are those without. Rays that stay in the grid."""
 
-from math import floor, inf, nan, radians, tan
+from collections.abc import Sequence
+from math import floor, inf, nan, pi, radians, tan
 
 import numpy as np
 import pytest
@@ -10,20 +11,24 @@ from numpy.typing import NDArray
 
 from monitor.ceiling import BLOCK, ceilings, clear_m
 from monitor.geodesy import Ray, along
-from monitor.prediction import Beam, Pointing, bins_at, predict, tangents
+from monitor.prediction import Beam, Pointing, bins_at, predict, stays_inside, tangents
 from monitor.terrain import Grid, Terrain, bilinear
 
 BIN_M = 18520 / 512
 POST_M = 25.0
+FARTHEST_M = 2000.0
+BENDS = st.floats(0, 30).flatmap(lambda most: st.tuples(*[st.floats(-most, most)] * 8))
 
 
 def rough(seed: int, rows: int = 90, columns: int = 70) -> NDArray[np.float32]:
     return np.random.default_rng(seed).normal(0, 40, (rows, columns)).astype(np.float32)
 
 
-def straight(row: float, column: float, azimuth_rad: float) -> Ray:
-    """A ray in posts that lie `POST_M` apart."""
-    return Ray(row, -np.cos(azimuth_rad) / POST_M, 0.0, 0.0, column, np.sin(azimuth_rad) / POST_M, 0.0, 0.0)
+def bent(row: float, column: float, azimuth_rad: float, posts: Sequence[float] = (0.0,) * 8) -> Ray:
+    """A ray in posts that lie `POST_M` apart; the higher powers of either polynomial come to `posts` at the end."""
+    down, right = np.reshape(posts, (2, 4)) / FARTHEST_M ** np.arange(2, 6)
+    powers = (row, -np.cos(azimuth_rad) / POST_M, *down, column, np.sin(azimuth_rad) / POST_M, *right)
+    return Ray._make(powers)
 
 
 def test_a_ceiling_is_the_highest_post_of_nine_blocks_and_none_where_one_is_void() -> None:
@@ -50,24 +55,68 @@ def test_terrain_of_less_than_three_blocks_has_no_ceilings() -> None:
     st.floats(-50, 600),
     st.floats(-1, 1),
     st.sampled_from([0.0, 3.6, 30.0]),
+    BENDS,
 )
 def test_all_ground_up_to_the_clear_distance_is_seen_below_the_tangent(
-    seed: int, row: float, column: float, azimuth: float, height_m: float, tangent: float, tolerance_m: float
+    seed: int,
+    row: float,
+    column: float,
+    azimuth: float,
+    height_m: float,
+    tangent: float,
+    tolerance_m: float,
+    posts: tuple[float, ...],
 ) -> None:
     height = rough(seed)
     height[seed % 90, seed % 70] = nan
-    ray = straight(row, column, azimuth)
-    distance_m = clear_m(ceilings(height), ray, height_m, tangent, tolerance_m, 2000.0)
-    for s in np.arange(0.0, distance_m, 5.0):
+    ray = bent(row, column, azimuth, posts)
+    distance_m = clear_m(ceilings(height), ray, height_m, tangent, tolerance_m, FARTHEST_M)
+    for s in np.arange(0.0, min(distance_m, FARTHEST_M), 5.0):
         ground_m = bilinear(height, *along(ray, s))
         for near in (max(s - tolerance_m, 0.0), s + tolerance_m):
             assert ground_m - height_m < tangent * near or (near == 0.0 and ground_m < height_m)
 
 
+@given(st.integers(0, 2**32 - 1))
+def test_no_peak_below_a_bent_ray_is_passed_over(seed: int) -> None:
+    """A ray that goes up to ten times as fast, over ground where every block along it but one is too low to matter."""
+    random = np.random.default_rng(seed)
+    ray = bent(400.0, 400.0, random.uniform(-4, 4), random.uniform(-75, 75, 8).tolist())
+    for peak_m in random.uniform(0, FARTHEST_M, 20):
+        row, column = along(ray, peak_m)
+        ceiling = np.zeros((198, 198), np.float32)
+        i, j = round(row) // BLOCK, round(column) // BLOCK
+        ceiling[i - 2 : i + 1, j - 2 : j + 1] = 1000.0  # as that of a post
+        assert clear_m(ceiling, ray, 100.0, 0.0, 0.0, FARTHEST_M) <= peak_m
+
+
+@given(st.floats(-4, 4), st.floats(1.0, FARTHEST_M), BENDS)
+def test_no_ray_surely_stays_inside_that_leaves_the_grid_by_a_hair_on_one_side(
+    azimuth: float, far_m: float, posts: tuple[float, ...]
+) -> None:
+    middle = bent(300.0, 300.0, azimuth, posts)
+    rows, columns = np.array([along(middle, s) for s in np.linspace(0, far_m, 2000).tolist()]).T
+    assert stays_inside(bent(2000.0, 2000.0, azimuth, posts), far_m, (4000, 4000))
+    hair = 1e-4
+    for down, right in (
+        (-rows.min() - hair, 0.0),
+        (0.0, -columns.min() - hair),
+        (599 - rows.max() + hair, 0.0),
+        (0.0, 599 - columns.max() + hair),
+    ):
+        assert not stays_inside(bent(300 + down, 300 + right, azimuth, posts), far_m, (600, 600))
+
+
+def test_a_straight_ray_surely_stays_inside_unless_it_ends_within_a_hundredth_of_a_post_of_the_rim() -> None:
+    for far_m, stays in ((40.01 * POST_M, False), (39.99 * POST_M, True)):
+        for azimuth in (0.0, pi / 2, pi, -pi / 2):
+            assert stays_inside(bent(40.0, 40.0, azimuth), far_m, (81, 81)) is stays
+
+
 def test_the_clear_distance_ends_before_a_wall_and_within_two_windows_of_it() -> None:
     height = np.zeros((200, 60), np.float32)
     height[:80] = 500.0
-    distance_m = clear_m(ceilings(height), straight(190.0, 30.0, 0.0), 400.0, -0.05, 3.6, 5000.0)
+    distance_m = clear_m(ceilings(height), bent(190.0, 30.0, 0.0), 400.0, -0.05, 3.6, 5000.0)
     wall_m = (190 - 80) * POST_M
     assert wall_m - 4 * BLOCK * POST_M < distance_m < wall_m
 
