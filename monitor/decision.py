@@ -2,10 +2,10 @@
 
 The statistic, T as published or the robust Q, looks at the sizes of the disparities of pairs, and the shift statistic
 at their directions. The unmatched shares look at shadows without a partner, so they see what is too far off to pair,
-and may alert where there are too few pairs for the others; small shadows come and go with the roughness of the ground
-and are not counted. Their shares scatter more than a binomial would, since shadows of a scan stand or fall together:
-the threshold is a quantile of the beta-binomial distribution with the mean m that calibration found, and of the share
-the variance m (1 - m) (1 / n + rho).
+and may alert where there are too few pairs for the others. Small shadows come and go with the roughness of the ground
+and are not counted, and a weak signal makes radar shadows where the terrain has none. The shares scatter more than a
+binomial would, since shadows of a scan stand or fall together: the threshold is a quantile of the beta-binomial
+distribution with the mean m that calibration found, and of the share the variance m (1 - m) (1 / n + rho).
 """
 
 from dataclasses import dataclass
@@ -71,14 +71,12 @@ class Findings:
 def examine(sample: ScanSample, settings: MonitorSettings, calibration: Calibration) -> Findings:
     """Put a sample to every test that it and the calibration allow."""
     d, c = sample.disparities, calibration
-    radar_model, dem_model = (c.unmatched_radar, c.unmatched_dem) if settings.method == "robust" else (None, None)
-    each = settings.p_fa * settings.unmatched_budget / 2
-    radar = _unmatched(RADAR_SHARE, sample.unmatched_radar, radar_model, each)
-    dem = _unmatched(DEM_SHARE, sample.unmatched_dem, dem_model, each)
-    p_fa = _p_fa_of_statistic(settings, calibration)
+    p_fa, p_fa_shift, p_fa_radar, p_fa_dem = _shares(settings, calibration)
+    radar = _unmatched(RADAR_SHARE, sample.unmatched_radar, c.unmatched_radar, p_fa_radar)
+    dem = _unmatched(DEM_SHARE, sample.unmatched_dem, c.unmatched_dem, p_fa_dem)
     if len(d) < settings.pairs_needed:
         return Findings(None, f"{len(d)} pairs of shadows, {settings.pairs_needed} needed", None, radar, dem)
-    shift = _shift(sample, settings, calibration)
+    shift = _shift(sample, c, p_fa_shift)
     q = robust_statistic(d, c.median_bins, c.clip_bins, c.sigma_bins)
     t = normalised(d, c.rms_bins)
     if settings.method == "robust":
@@ -94,7 +92,7 @@ def examine(sample: ScanSample, settings: MonitorSettings, calibration: Calibrat
 
 def pairs_for_verdict(settings: MonitorSettings, calibration: Calibration) -> int:
     """The least number of pairs with which the statistic can exceed its threshold."""
-    p_fa, least = _p_fa_of_statistic(settings, calibration), settings.pairs_needed
+    p_fa, least = _shares(settings, calibration)[0], settings.pairs_needed
     if settings.method == "paper":
         return least
     factor = calibration.variance_factor
@@ -107,13 +105,17 @@ def _most(pairs: int, calibration: Calibration) -> float:
     return pairs * (calibration.clip_bins / calibration.sigma_bins) ** 2
 
 
-def _p_fa_of_statistic(settings: MonitorSettings, calibration: Calibration) -> float:
-    """What the other tests leave."""
+def _shares(settings: MonitorSettings, calibration: Calibration) -> tuple[float, float, float, float]:
+    """The P_FA of the statistic, of the shift statistic, and of either thread's unmatched share.
+
+    The statistic has what the others leave; the published test knows no others, nor does a calibration that lacks what
+    they need.
+    """
     s, c = settings, calibration
-    if s.method == "paper":
-        return s.p_fa
-    unmatched = s.unmatched_budget / 2 * sum(model is not None for model in (c.unmatched_radar, c.unmatched_dem))
-    return s.p_fa * (1 - unmatched - s.shift_budget * (c.common_error_bins is not None))
+    budgets = ((s.shift_budget, c.common_error_bins), (s.unmatched_radar_budget, c.unmatched_radar),
+               (s.unmatched_dem_budget, c.unmatched_dem))  # fmt: skip
+    shift, radar, dem = (0.0 if s.method == "paper" or known is None else budget for budget, known in budgets)
+    return s.p_fa * (1 - shift - radar - dem), s.p_fa * shift, s.p_fa * radar, s.p_fa * dem
 
 
 def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> float:
@@ -134,9 +136,8 @@ def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> fl
     return float(np.argmax(more <= p_fa) / eligible)
 
 
-def _shift(sample: ScanSample, settings: MonitorSettings, c: Calibration) -> Test | None:
-    p_fa = settings.p_fa * settings.shift_budget
-    if settings.method == "paper" or c.common_error_bins is None or not p_fa:
+def _shift(sample: ScanSample, c: Calibration, p_fa: float) -> Test | None:
+    if c.common_error_bins is None or not p_fa:
         return None
     found = shift_statistic(
         sample.disparities, sample.azimuth_rad, c.median_bins, c.clip_bins, c.sigma_bins, c.common_error_bins

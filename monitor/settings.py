@@ -5,7 +5,7 @@ from typing import Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 SEARCH_STEP_M = 200.0  # shadows of mountains move together over about as far
-MOST_GIVEN = 0.9 + 1e-9  # of p_fa, to other tests than the statistic; with room for rounding
+MOST_GIVEN = 0.95 + 1e-9  # of p_fa, to other tests than the statistic; with room for rounding
 HeightSource = Literal["076", "370"]
 
 
@@ -25,9 +25,12 @@ class MonitorSettings(BaseModel):
 
     method: Literal["robust", "paper"] = Field("robust", description="which test decides: clipped Q, or T as published")
     p_fa: float = Field(1e-4, gt=0, lt=0.5, description="probability of a false alert in one scan")
-    shift_budget: float = Field(0.4, ge=0, le=0.9, description="share of p_fa that goes to the test for a shift")
-    unmatched_budget: float = Field(
-        0.3, ge=0, le=0.9, description="share of p_fa that goes to the tests of unmatched shadows, half to each thread"
+    shift_budget: float = Field(0.6, ge=0, le=0.95, description="share of p_fa that goes to the test for a shift")
+    unmatched_dem_budget: float = Field(
+        0.35, ge=0, le=0.95, description="share of p_fa that goes to the test of unmatched terrain shadows"
+    )
+    unmatched_radar_budget: float = Field(
+        0.0, ge=0, le=0.95, description="the same of radar shadows, which a weak signal makes too"
     )
     window_scans: int = Field(
         1, ge=1, le=30, description="scans whose pairs may be gathered where one has too few for a verdict"
@@ -108,8 +111,8 @@ class MonitorSettings(BaseModel):
 
     @model_validator(mode="after")
     def _something_is_left_for_the_statistic(self) -> Self:
-        if (given := self.shift_budget + self.unmatched_budget) > MOST_GIVEN:
-            raise ValueError(f"shift_budget and unmatched_budget are {given:g} together: leave Q a tenth of p_fa")
+        if (given := self.shift_budget + self.unmatched_dem_budget + self.unmatched_radar_budget) > MOST_GIVEN:
+            raise ValueError(f"shift_budget and the unmatched budgets are {given:g} together: leave Q 0.05 of p_fa")
         return self
 
     @model_validator(mode="after")

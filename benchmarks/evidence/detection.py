@@ -27,16 +27,15 @@ WAYS = ("T as published", "Q", "shift", "unmatched", "mean", "default")
 def _by_test(scan: ScanSample, calibration: Calibration) -> dict[str, bool]:
     """What each test alone, at the whole P_FA, and the default say."""
     paper = examine(scan, MonitorSettings(p_fa=P_FA, method="paper"), calibration)
-    alone = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_budget=0.0), calibration)
-    shift = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.9, unmatched_budget=0.0), calibration)
-    shares = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_budget=0.9), calibration)
+    alone = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_dem_budget=0.0), calibration)
+    shift = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.95, unmatched_dem_budget=0.0), calibration)
+    shares = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_dem_budget=0.95), calibration)
     default = examine(scan, MonitorSettings(p_fa=P_FA), calibration)
-    unmatched = [test for test in (shares.unmatched_radar, shares.unmatched_dem) if test]
     verdicts = (
         bool(paper.alerts),
         _statistic(alone),
         shift.shift is not None and shift.shift.exceeded,
-        any(test.exceeded for test in unmatched),
+        shares.unmatched_dem is not None and shares.unmatched_dem.exceeded,
         _mean(scan, calibration),
         bool(default.alerts),
     )

@@ -10,7 +10,7 @@ from scipy.stats import binom
 from benchmarks.evidence.flown import Flown
 from benchmarks.evidence.tables import rate, table
 from monitor.calibration import Calibration
-from monitor.decision import examine
+from monitor.decision import examine, unmatched_threshold
 from monitor.disparity import robust_statistic
 from monitor.fitting import fit
 from monitor.sample import ScanSample
@@ -22,7 +22,7 @@ MINIMUM_PAIRS = 16
 DRAWS = 20_000
 SIGNIFICANCE = 0.01
 
-DEFAULT = "the default: Q, shift and unmatched shares"
+DEFAULT = "the default: Q, shift and unmatched terrain shadows"
 
 Alerts = Callable[[ScanSample, float], bool]
 
@@ -44,9 +44,10 @@ def tests(calibration: Calibration, pool: Sequence[ScanSample]) -> dict[str, Ale
     """Each way to decide, by name."""
     return {
         "T as published": _decision(calibration, method="paper"),
-        "Q": _decision(calibration, shift_budget=0.0, unmatched_budget=0.0),
+        "Q": _decision(calibration, shift_budget=0.0, unmatched_dem_budget=0.0),
         DEFAULT: _decision(calibration),
-        "the shift statistic alone": Shift(calibration),
+        "the shift statistic": Shift(calibration),
+        "unmatched terrain shadows": Unmatched(calibration),
         "Q against a bootstrap": Bootstrap(calibration, pool),
     }
 
@@ -63,15 +64,29 @@ class Shift:
     """The shift statistic with the whole probability of a false alert."""
 
     def __init__(self, calibration: Calibration) -> None:
-        self._calibration = calibration
+        if calibration.common_error_bins is None:
+            raise ValueError(f"calibration {calibration.name} has no common error: fit one")
+        self._calibration, self._common = calibration, calibration.common_error_bins
 
     def __call__(self, scan: ScanSample, p_fa: float) -> bool:
         """Whether it exceeds its threshold."""
-        c, common = self._calibration, self._calibration.common_error_bins
-        if common is None:
-            raise ValueError(f"calibration {c.name} has no common error: fit one")
+        c, common = self._calibration, self._common
         d, azimuth = scan.disparities, scan.azimuth_rad
         return shift_statistic(d, azimuth, c.median_bins, c.clip_bins, c.sigma_bins, common) > shift_threshold(p_fa)
+
+
+class Unmatched:
+    """The share of unmatched terrain shadows with the whole probability of a false alert."""
+
+    def __init__(self, calibration: Calibration) -> None:
+        if calibration.unmatched_dem is None:
+            raise ValueError(f"calibration {calibration.name} has no unmatched terrain shadows: fit one")
+        self._model = calibration.unmatched_dem
+
+    def __call__(self, scan: ScanSample, p_fa: float) -> bool:
+        """Whether it exceeds its threshold."""
+        found = scan.unmatched_dem
+        return found.share is not None and found.share > unmatched_threshold(found.eligible, self._model, p_fa)
 
 
 class Bootstrap:

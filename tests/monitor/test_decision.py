@@ -63,14 +63,16 @@ def test_a_share_of_few_shadows_cannot_exceed_its_threshold() -> None:
 
 
 def test_the_probability_of_a_false_alert_is_split_among_the_tests() -> None:
-    settings = MonitorSettings(p_fa=1e-3, shift_budget=0.5, unmatched_budget=0.4)
+    settings = MonitorSettings(p_fa=1e-3, shift_budget=0.5, unmatched_dem_budget=0.3, unmatched_radar_budget=0.1)
     found = examine(sample(), settings, CALIBRATION)
     assert found.statistic is not None
     assert found.shift is not None
     assert found.unmatched_radar is not None
     assert found.statistic.limit == pytest.approx(chi2.isf(0.1e-3, 40))
     assert found.shift.limit == pytest.approx(chi2.isf(0.5e-3, 2))
-    assert found.unmatched_radar.limit == unmatched_threshold(50, MODEL, 0.2e-3)
+    assert found.unmatched_dem is not None
+    assert found.unmatched_radar.limit == unmatched_threshold(50, MODEL, 0.1e-3)
+    assert found.unmatched_dem.limit == unmatched_threshold(50, MODEL, 0.3e-3)
 
 
 @pytest.mark.parametrize(
@@ -78,7 +80,7 @@ def test_the_probability_of_a_false_alert_is_split_among_the_tests() -> None:
     [
         (MonitorSettings(p_fa=1e-3, method="paper"), CALIBRATION),
         (MonitorSettings(p_fa=1e-3), BARE),
-        (MonitorSettings(p_fa=1e-3, shift_budget=0, unmatched_budget=0), CALIBRATION),
+        (MonitorSettings(p_fa=1e-3, shift_budget=0, unmatched_dem_budget=0), CALIBRATION),
     ],
 )
 def test_the_statistic_has_it_all_where_it_is_the_only_test(
@@ -91,12 +93,13 @@ def test_the_statistic_has_it_all_where_it_is_the_only_test(
 
 
 def test_unmatched_shadows_alert_alone_where_there_are_too_few_pairs_for_the_statistic() -> None:
-    settings = MonitorSettings(p_fa=1e-3)
+    settings = MonitorSettings(p_fa=1e-3, unmatched_radar_budget=0.05)
     found = examine(sample(n=3, radar=MANY), settings, CALIBRATION)
     assert found.statistic is None
     assert found.blind == "3 pairs of shadows, 16 needed"
     assert [test.name for test in found.alerts] == [RADAR_SHARE]
     assert [test.name for test in examine(sample(dem=MANY), settings, CALIBRATION).alerts] == [DEM_SHARE]
+    assert not examine(sample(radar=MANY), MonitorSettings(p_fa=1e-3), CALIBRATION).alerts  # told, not tested
     assert str(found.alerts[0]).startswith("the unmatched share of radar shadows 0.9 exceeds 0.")
 
 
