@@ -93,7 +93,7 @@ def test_the_statistic_has_it_all_where_it_is_the_only_test(
 
 
 def test_unmatched_shadows_alert_alone_where_there_are_too_few_pairs_for_the_statistic() -> None:
-    settings = MonitorSettings(p_fa=1e-3, unmatched_radar_budget=0.05)
+    settings = MonitorSettings(p_fa=1e-3, shift_budget=0.5, unmatched_radar_budget=0.1)
     found = examine(sample(n=3, radar=MANY), settings, CALIBRATION)
     assert found.statistic is None
     assert found.blind == "3 pairs of shadows, 16 needed"
