@@ -241,6 +241,8 @@ def _listen(leg: Leg, gateway: "subprocess.Popen[str]", console: Console) -> Non
             figures = f"N {event['n_pairs']:3d}"
             if event["threshold"] is not None:
                 figures += f"  Q {event['q']:6.1f} against {event['threshold']:.1f}"
+            if event["shift_limit"] is not None and event["shift"] is not None:
+                figures += f"  S {event['shift']:6.1f} against {event['shift_limit']:.1f}"
             why = "" if event["verdict"] == OK else f"  {event['reasons'][0]}"
             verdict = Text(event["verdict"], COLOURS[event["verdict"]])
             console.print(Text.assemble(f"scan {event['scan']:2d}  ", verdict, f"  {figures}{why}"))

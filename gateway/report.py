@@ -29,10 +29,13 @@ from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
 
 VERDICT_COLOURS = {OK: "#2f8f4e", ALERT: "#c62828", UNAVAILABLE: "#b38600"}
 LEGEND = [
-    *(Line2D([], [], ls="", marker="o", color=VERDICT_COLOURS[name], label=f"Q: {name}") for name in (OK, ALERT)),
+    *(
+        Line2D([], [], ls="", marker="o", color=VERDICT_COLOURS[name], label=f"largest test: {name}")
+        for name in (OK, ALERT)
+    ),
     Line2D([], [], ls="", marker="x", color="#8899aa", label="T as published"),
     Line2D([], [], lw=2, ls=":", color=VERDICT_COLOURS[UNAVAILABLE], label=UNAVAILABLE),
-    Line2D([], [], lw=1, ls="--", color="k", label="threshold"),
+    Line2D([], [], lw=1, ls="--", color="k", label="limit"),
 ]
 
 
@@ -87,9 +90,10 @@ def write_report(directory: Path, legs: Sequence[Flown]) -> Path:
     parts = ["<!doctype html><meta charset=utf-8><title>shadebus report</title>", STYLE, "<h1>shadebus report</h1>"]
     parts += [_origins(legs), EXPLANATION]
     _save(_timeline(legs), directory / "statistic.png")
-    parts.append("<h2>The test statistic against its threshold</h2>")
-    how = "Each dot is a scan; above the dashed line it alerts. A vertical line is a scan without a verdict."
-    parts.append(_figure("statistic.png", "statistic over threshold", f"{how} {every_scan}."))
+    parts.append("<h2>The tests against their limits</h2>")
+    how = "Each dot is a scan, by that of its tests which comes nearest to its limit or farthest beyond: above the "
+    how += "dashed line it alerts. A vertical line is a scan without the statistic."
+    parts.append(_figure("statistic.png", "tests over their limits", f"{how} {every_scan}."))
     _save(_histogram(legs), directory / "disparities.png")
     parts.append("<h2>Disparities</h2>")
     parts.append(
@@ -126,8 +130,10 @@ D<sup>2</sup>, as published. Q is the sum of the squares of D, each taken about 
 over the calibrated variance; it has no unit. The threshold is what the statistic of the method (Q for robust,
 N<sub>D</sub> T / sigma<sup>2</sup> for paper) exceeds with probability P<sub>FA</sub> in a scan in which nothing is
 wrong: above it the verdict is <i>alert</i>. The mean is that of D: a terrain that lies too near or too far on all
-radials moves it, a sideways shift need not. Unmatched is the share of shadows that have no partner in the other
-thread: of the radar's, and of the terrain's. It is reported and not judged. <i>Unavailable</i> means that nothing
+radials moves it, a sideways shift need not. S is the shift statistic: whether the disparities follow the cosine of
+the azimuth, as over terrain that is stored some way off. Unmatched is the share of shadows that have no partner in
+the other thread: of the radar's, and of the terrain's. With a calibration S and the terrain's share alert too, above
+limits of their own. <i>Unavailable</i> means that nothing
 can be said, for the reason given; it is neither ok nor alert.</p>"""
 
 
@@ -243,14 +249,25 @@ def _timeline(legs: Sequence[Flown]) -> Figure:
             if v.q is None or v.threshold is None:
                 panel.axvline(time_s, color=colour, lw=2, ls=":")
             else:
-                panel.plot(time_s, v.q / v.threshold, "o", color=colour)
+                panel.plot(time_s, _largest(v, leg.monitor.settings.method), "o", color=colour)
                 t_threshold = threshold(v.n_pairs, leg.monitor.settings.p_fa)
                 panel.plot(time_s, (v.t_normalised or 0) / t_threshold, "x", color="#8899aa")
         panel.axhline(1, color="k", lw=1, ls="--")
         panel.set(title=leg.title, xlabel="time since the first radial (s)")
-    axes[0].set(ylabel="statistic over its threshold", ylim=(0, 1.1 * max(axes[0].get_ylim()[1], 1)))
+    axes[0].set(ylabel="value over its limit", ylim=(0, 1.1 * max(axes[0].get_ylim()[1], 1)))
     figure.legend(handles=LEGEND, ncols=len(LEGEND), loc="outside upper center", fontsize="small")
     return figure
+
+
+def _largest(v: Verdict, method: str) -> float:
+    """Of all tests that decide, the largest value over its limit."""
+    tests = (
+        (v.q if method == "robust" else v.t_normalised, v.threshold),
+        (v.shift, v.shift_limit),
+        (v.unmatched_radar, v.unmatched_radar_limit),
+        (v.unmatched_dem, v.unmatched_dem_limit),
+    )
+    return max((value / limit for value, limit in tests if value is not None and limit), default=0.0)
 
 
 def _histogram(legs: Sequence[Flown]) -> Figure:
@@ -277,6 +294,8 @@ HEADINGS = (
     "Q (no unit)",
     "threshold (no unit)",
     "mean (bins)",
+    "S (no unit)",
+    "its limit",
     "unmatched, radar (%)",
     "unmatched, terrain (%)",
     "reasons",
@@ -291,7 +310,7 @@ def _table(legs: Sequence[Flown]) -> str:
             shares = (None if share is None else 100 * share for share in (v.unmatched_radar, v.unmatched_dem))
             figures = "".join(
                 f"<td>{'' if x is None else format(x, '.1f')}"
-                for x in (v.t_bins2, v.q, v.threshold, v.mean_bins, *shares)
+                for x in (v.t_bins2, v.q, v.threshold, v.mean_bins, v.shift, v.shift_limit, *shares)
             )
             texts = (html.escape(leg.title), v.scan, clock(picture.utc_ns), v.verdict, v.n_pairs)
             reasons = html.escape("; ".join(v.reasons))
