@@ -36,7 +36,7 @@ def calibrate_radar(
 
     # What is to be made need not be there yet.
     rack = load_config(config).model_copy(update={"calibration": None}) if config else None
-    named = {job.path: job for source in recordings for job in jobs(source, rack, dem or ())}
+    named = {job.path.resolve(): job for source in recordings for job in jobs(source, rack, dem or ())}
     listed = {first: named[first] for first, *_ in sessions(named)}  # which later files of a session come with
     results = on_all_cores(read, listed.values())
     reads = list(track(results, "recordings", len(listed), console=plain_console(), transient=True))
