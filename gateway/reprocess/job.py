@@ -63,7 +63,7 @@ def key(job: Job) -> str:
 
 
 def _key(recording: Recording, config: RackConfig, monitor: Monitor | None) -> str:
-    files = [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in recording.files]
+    files = [(str(path), *_size_and_change(path)) for path in recording.files]
     calibration = monitor.calibration.model_dump_json() if monitor and monitor.calibration else ""
     terrain = monitor.terrain.checksum if monitor else ""
     water = monitor.water.checksum if monitor and monitor.water else ""
@@ -120,14 +120,14 @@ def set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
             f"give one of its adapters ({', '.join(sorted(given))}) that name"
         )
     maps = (*(job.terrain or config.terrain), *config.water, *((config.calibration,) if config.calibration else ()))
-    files = [(path, path.stat().st_mtime_ns) for path in maps if path.exists()]
+    files = [(path, *_size_and_change(path)) for path in maps if path.exists()]
     made_with = tuple((name, recording.metadata[name]) for name in MADE_WITH if name in recording.metadata)
     return _made(job.config, job.terrain, made_with, tuple(files))
 
 
 @lru_cache(maxsize=SET_UPS)
 def _made(
-    config: str, terrain: tuple[Path, ...], metadata: tuple[tuple[str, str], ...], _: tuple[tuple[Path, int], ...]
+    config: str, terrain: tuple[Path, ...], metadata: tuple[tuple[str, str], ...], _: tuple[tuple[Path, int, int], ...]
 ) -> tuple[RackConfig, Monitor | None]:
     """The same for all recordings that were made alike, as long as the files that it rests on are the same."""
     if not config:
@@ -137,6 +137,12 @@ def _made(
     if terrain:
         given = given.model_copy(update={"terrain": terrain})
     return given, build_monitor(given)
+
+
+def _size_and_change(path: Path) -> tuple[int, int]:
+    """While both are the same, a file counts as the same: bytes, and ns of its last change."""
+    found = path.stat()
+    return found.st_size, found.st_mtime_ns
 
 
 def _row(name: str, event: IntegrityEvent, scan: ScanEvent | None) -> dict[str, Any]:
