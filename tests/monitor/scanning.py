@@ -52,9 +52,12 @@ def flying(**changed: float) -> Aircraft:
     return aircraft
 
 
-def lit(terrain: Terrain, azimuth: NDArray[np.float64], elevation: NDArray[np.float64]) -> NDArray[np.int8]:
+def lit(
+    terrain: Terrain, azimuth: NDArray[np.float64], elevation: NDArray[np.float64], **changed: float
+) -> NDArray[np.int8]:
+    place = {**HERE, **changed}
     latitude, longitude, height = (
-        np.full(len(azimuth), HERE[name]) for name in ("latitude_deg", "longitude_deg", "height_m")
+        np.full(len(azimuth), place[name]) for name in ("latitude_deg", "longitude_deg", "height_m")
     )
     pointing = Pointing(latitude, longitude, height, azimuth, elevation)
     states, void = predict(terrain.grid, pointing, 512, 18_520 / 512, Beam())
@@ -80,9 +83,10 @@ def scan_of(echoes: NDArray[np.uint8], angles: NDArray[np.float64] = ANGLES) -> 
     )
 
 
-def honest_scan(terrain: Terrain) -> Scan:
-    """One that agrees with the terrain to the bin."""
-    states = lit(terrain, np.radians(HERE["heading_deg"] + ANGLES), np.full(len(ANGLES), radians(TILT_DEG)))
+def honest_scan(terrain: Terrain, **changed: float) -> Scan:
+    """One that agrees with the terrain to the bin; from another place than `HERE` if that is changed."""
+    azimuth, elevation = np.radians(HERE["heading_deg"] + ANGLES), np.full(len(ANGLES), radians(TILT_DEG))
+    states = lit(terrain, azimuth, elevation, **changed)
     return scan_of(3 * (states > 0).astype(np.uint8))
 
 
