@@ -1,5 +1,6 @@
 """Many records at once say what they say one by one, however they are cut and whatever goes wrong on the way."""
 
+import json
 import struct
 from collections import Counter
 from collections.abc import Callable
@@ -27,7 +28,8 @@ from tests.gateway.made import SECOND_NS, stamp
 
 SWEEP_S = 61 * 3 / 40
 CHUNK_NS = 10_000_000
-RADAR = 0  # its channel
+MID_SCAN_NS = 1_500_000_000  # of the first of two
+RADAR, IRU, RELIEF = 0, 1, 9  # channels
 Change = Callable[[np.random.Generator, Packet], list[Packet]]
 
 
@@ -63,11 +65,37 @@ def radar_pauses(_: np.random.Generator, packet: Packet) -> list[Packet]:
     return [] if packet.channel == RADAR and SECOND_NS < packet.time_ns < 7.5 * SECOND_NS else [packet]
 
 
+def says_what_it_is(_: np.random.Generator, packet: Packet) -> list[Packet]:
+    """The radar alone is announced; the other buses begin in mid-scan, and label 377 says what they are."""
+    if packet.type == f.HELLO:
+        return [packet._replace(body=racklink.hello(7, 0x0100, [(RADAR, f.KIND_708, 0, 0)]))]
+    return [packet] if packet.type != f.WORDS_429 or packet.time_ns > MID_SCAN_NS else []
+
+
+def is_relieved(_: np.random.Generator, packet: Packet) -> list[Packet]:
+    """A second IRU that nobody announced begins in mid-scan; the first falls silent, and in a later scan it is used."""
+    if packet.type != f.WORDS_429 or packet.channel != IRU:
+        return [packet]
+    first = [packet] if packet.time_ns < 3 * SECOND_NS else []
+    return first + ([packet._replace(channel=RELIEF)] if packet.time_ns > MID_SCAN_NS else [])
+
+
 def as_it_is(_: np.random.Generator, packet: Packet) -> list[Packet]:
     return [packet]
 
 
-CHANGES: list[Change] = [as_it_is, lost, doubled, flagged, clock_jumps, cut_body, falls_silent, radar_pauses]
+CHANGES: list[Change] = [
+    as_it_is,
+    lost,
+    doubled,
+    flagged,
+    clock_jumps,
+    cut_body,
+    falls_silent,
+    radar_pauses,
+    says_what_it_is,
+    is_relieved,
+]
 
 
 @cache
@@ -150,6 +178,25 @@ def test_where_nobody_asks_for_the_state_the_verdicts_and_counters_are_the_same(
     for sizes in ([1], [len(records)], [100]):
         lines = given(records, sizes, tells_state=False)
         assert [line for line in lines if any(kind in line for kind in judged)] == expected
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [(says_what_it_is, {1: "iru_704", 2: "gnss_743a", 3: "ra_707"}), (is_relieved, {RELIEF: "iru_704"})],
+)
+def test_a_channel_that_says_in_mid_scan_what_it_is_serves_the_scans_that_need_it(
+    change: Change, said: dict[int, str]
+) -> None:
+    """The first scan lacks the state on some radials; without the channel the second would on all of them."""
+    events = [json.loads(line) for line in given(flown(change), [1])]
+    told = {event["reason"]: at for at, event in enumerate(events) if event.get("state") == "IDENTIFIED"}
+    assert set(told) == {
+        f"label 377 says what channel {channel} is: read as {name} from now on" for channel, name in said.items()
+    }
+    assert max(told.values()) < next(at for at, event in enumerate(events) if event["type"] == "scan")
+    first, second = (event for event in events if event["type"] == "integrity")
+    assert any("of 61 radials" in reason for reason in first["reasons"])
+    assert min(first["n_pairs"], second["n_pairs"]) > 0
 
 
 def test_most_packets_of_a_flight_are_taken_many_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
