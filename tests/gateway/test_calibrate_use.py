@@ -1,6 +1,7 @@
 """Calibrations of flights by a rack file: its settings and its water decide, and a monitor uses what came out."""
 
 import json
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from monitor.calibration import Calibration, load_calibration
 from simulators.scenario import BUILT_IN_TERRAIN
 from tests.gateway.flown import record_flight
 
+MOUNTAINS = BUILT_IN_TERRAIN["white_mountains"]
 SWEEPS = 5
 FIRST, SECOND = "flight1", "flight2"
 ADAPTER = {"name": "bridge", "source": "serial:x"}
@@ -53,7 +55,7 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def rack(**sections: object) -> RackConfig:
-    table = {"adapters": [ADAPTER], "terrain": [BUILT_IN_TERRAIN["white_mountains"]], **sections}
+    table = {"adapters": [ADAPTER], "terrain": [MOUNTAINS], **sections}
     return check_config(table, "test")
 
 
@@ -91,7 +93,7 @@ def test_each_checked_rate_is_how_often_a_monitor_of_these_settings_alerts(fligh
 
 
 def test_shadows_over_the_water_of_the_configuration_take_no_part(flights: Path, lake: Path, tmp_path: Path) -> None:
-    """Whether a rack file names the water or the recordings were made with it; and as in flight."""
+    """Whether a rack file or the user names the water, or the recordings were made with it; and as in flight."""
     wet = rack(water=[lake])
     record_flight(tmp_path / f"{FIRST}.mcap", 1, SWEEPS, water=[lake])
     dry, given, recorded = (
@@ -100,6 +102,10 @@ def test_shadows_over_the_water_of_the_configuration_take_no_part(flights: Path,
     )
     assert given == recorded
     assert all(0 < len(some) < len(every) for some, every in zip(given, dry, strict=True))
+    for one in (reads(flights, wet)[0], *map(read, jobs(flights / f"{FIRST}.mcap", None, (), [lake]))):
+        assert [scan.sample.disparities.tolist() for scan in one.scans] == given
+        terrain, water = (f"{zlib.crc32(path.read_bytes()):08x}" for path in (MOUNTAINS, lake))
+        assert one.terrain == f"N44W072.hgt (checksum {terrain}) without water lake.geojson (checksum {water})"
     in_flight = [verdict.n_pairs for verdict in verdicts(flights / f"{FIRST}.mcap", wet)]
     assert [len(scan) for scan in given] == in_flight
 
