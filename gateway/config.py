@@ -184,6 +184,10 @@ class RackConfig(_Section):
     monitor: MonitorSettings = MonitorSettings()
     wait_for_devices: bool = Field(False, description="start although a device is not there yet, and keep trying")
 
+    def with_maps(self, terrain: tuple[Path, ...], water: tuple[Path, ...]) -> Self:
+        """The same with other terrain and water, of each only if files are given."""
+        return self.model_copy(update={"terrain": terrain or self.terrain, "water": water or self.water})
+
     @model_validator(mode="after")
     def _adapters_have_names_of_their_own(self) -> Self:
         names = [adapter.name for adapter in self.adapters]

@@ -67,8 +67,10 @@ def recorded_config(metadata: dict[str, str]) -> RackConfig:
         raise GatewayError("the recording's metadata holds no configuration that this version understands") from error
 
 
-def recorded_monitor(metadata: dict[str, str], config: RackConfig, terrain: tuple[Path, ...] = ()) -> Monitor | None:
-    """The monitor that a recording was made with; `terrain` replaces the files it was made with.
+def recorded_monitor(
+    metadata: dict[str, str], config: RackConfig, terrain: tuple[Path, ...] = (), water: tuple[Path, ...] = ()
+) -> Monitor | None:
+    """The monitor that a recording was made with; `terrain` and `water` replace the files it was made with.
 
     Raises GatewayError if the recorded files are not there any more or have changed.
     """
@@ -76,13 +78,12 @@ def recorded_monitor(metadata: dict[str, str], config: RackConfig, terrain: tupl
         calibration = Calibration.model_validate_json(metadata["calibration"]) if metadata["calibration"] else None
     except (KeyError, ValidationError) as error:
         raise GatewayError("the recording's metadata holds no calibration that this version understands") from error
-    if terrain:
-        config = config.model_copy(update={"terrain": terrain})
+    config = config.with_maps(terrain, water)
     monitor = build_monitor(config, calibration)
     if monitor and not terrain and monitor.terrain.checksum != metadata["terrain_checksum"]:
         files = ", ".join(str(path) for path in config.terrain)
         raise GatewayError(f"{files} changed since the recording was made: name the terrain to use with --dem")
-    if monitor and monitor.water and monitor.water.checksum != metadata.get("water_checksum"):
+    if monitor and monitor.water and not water and monitor.water.checksum != metadata.get("water_checksum"):
         files = ", ".join(str(path) for path in config.water)
-        raise GatewayError(f"water {files} changed since the recording was made: put back what it was made with")
+        raise GatewayError(f"water {files} changed since the recording was made: name the water to use with --water")
     return monitor

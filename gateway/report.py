@@ -185,7 +185,7 @@ ORIGINS: dict[str, Callable[[Flown], str]] = {
     "began": lambda leg: utc(leg.began_ns),
     "ended": lambda leg: utc(leg.ended_ns),
     "terrain": lambda leg: ", ".join(path.name for path in leg.monitor.terrain.paths),
-    "terrain checksum (CRC-32)": lambda leg: leg.monitor.terrain.checksum,
+    "terrain checksum": lambda leg: leg.monitor.terrain.checksum,
     "method": lambda leg: leg.monitor.settings.method,
     "P<sub>FA</sub> (per scan)": lambda leg: f"{leg.monitor.settings.p_fa:g}",
     "calibration": lambda leg: _calibration(leg.monitor.calibration),

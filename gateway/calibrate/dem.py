@@ -169,7 +169,7 @@ def provenance(terrain: Terrain, setup: Setup, runs: int) -> str:
     return (
         f"{runs} runs of {setup.radials} radials, seed {setup.seed}, at {setup.true.latitude_deg:.6f}, "
         f"{setup.true.longitude_deg:.6f}, tilt {setup.true.tilt_deg:g} degrees, over "
-        f"{', '.join(path.name for path in terrain.paths)} (CRC-32 {terrain.checksum}); {setup.bins} bins of "
+        f"{', '.join(path.name for path in terrain.paths)} (checksum {terrain.checksum}); {setup.bins} bins of "
         f"{setup.bin_width_m:.2f} m, shadows of {setup.sizes[0]} to {setup.sizes[1]} bins paired by {setup.pairing}; "
         f"beam {_listed(setup.beam)}; sigma of errors {_listed(setup.sigma)}, of posts {setup.post_noise_m:g} m; "
         f"steps {_listed(setup.step)}; "

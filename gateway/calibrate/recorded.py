@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.chunks import blocks
+from gateway.config import RackConfig
 from gateway.core import Core
 from gateway.errors import GatewayError
 from gateway.pipeline import Pipeline
@@ -68,8 +69,7 @@ def read(job: Job) -> Read:
         raise GatewayError(f"{job.path} was recorded without terrain: name the reference terrain with --dem")
     # Without a calibration, which some scans may not be for.
     monitor = Monitor(recorded.terrain, recorded.settings, water=recorded.water)
-    names = ", ".join(path.name for path in monitor.terrain.paths)
-    found = Read(job.name, _digest(recording), f"{names} (CRC-32 {monitor.terrain.checksum})", monitor.settings)
+    found = Read(job.name, _digest(recording), _reference(config, monitor), monitor.settings)
 
     def watch(scan: Scan, verdict: Verdict, comparison: Comparison | None) -> None:
         if comparison is None:
@@ -100,6 +100,14 @@ def _compared(scan: Scan, comparison: Comparison) -> Compared:
         radar, dem = comparison.radar_states[:, :limit], comparison.dem_states[:, :limit]
         centres.append(residuals(radar, dem, (1, size), "overlap").centre)
     return Compared(Setting(bins, scan.range_nm, scan.profile), comparison.sample(scan), tuple(centres))
+
+
+def _reference(config: RackConfig, monitor: Monitor) -> str:
+    """The terrain, and the water over which nothing counts, with their checksums."""
+    said = f"{', '.join(path.name for path in monitor.terrain.paths)} (checksum {monitor.terrain.checksum})"
+    if not monitor.water:
+        return said
+    return f"{said} without water {', '.join(path.name for path in config.water)} (checksum {monitor.water.checksum})"
 
 
 def _digest(recording: Recording) -> str:

@@ -14,6 +14,7 @@ def calibrate_radar(
     recordings: Annotated[list[Path], typer.Argument(help="recordings, or directories with recordings below them")],
     output: Output,
     dem: Annotated[list[Path] | None, typer.Option(help="terrain instead of the recorded one; repeatable")] = None,
+    water: Annotated[list[Path] | None, typer.Option(help="water instead of the recorded one; repeatable")] = None,
     config: Rack = None,
     report: Report = None,
     least_scans: Annotated[int, typer.Option(min=4, help="be content with so many scans")] = 1000,
@@ -36,7 +37,7 @@ def calibrate_radar(
 
     # What is to be made need not be there yet.
     rack = load_config(config).model_copy(update={"calibration": None}) if config else None
-    named = {job.path: job for source in recordings for job in jobs(source, rack, dem or ())}
+    named = {job.path.resolve(): job for source in recordings for job in jobs(source, rack, dem or (), water or ())}
     listed = {first: named[first] for first, *_ in sessions(named)}  # which later files of a session come with
     results = on_all_cores(read, listed.values())
     reads = list(track(results, "recordings", len(listed), console=plain_console(), transient=True))

@@ -17,6 +17,7 @@ def replay(
     rename: Annotated[list[str] | None, typer.Option(help="OLD=NEW, another name for an adapter; repeatable")] = None,
     json: Annotated[bool, typer.Option("--json", help="events as JSON lines, the same bytes as live")] = False,
     dem: Annotated[list[Path] | None, typer.Option(help="terrain instead of the recorded one; repeatable")] = None,
+    water: Annotated[list[Path] | None, typer.Option(help="water instead of the recorded one; repeatable")] = None,
 ) -> None:
     """Replay a recording exactly.
 
@@ -43,7 +44,7 @@ def replay(
     failures: list[str] = []
     emit = print_json if json else print_line
     for _ in islice(count(), loop or None):
-        monitor = recorded_monitor(source.metadata, config, tuple(dem or ()))
+        monitor = recorded_monitor(source.metadata, config, tuple(dem or ()), tuple(water or ()))
         play(
             source,
             config,

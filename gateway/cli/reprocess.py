@@ -11,12 +11,13 @@ def reprocess(
     output: Annotated[Path, typer.Option("--output", "-o", help="directory of the data set")],
     config: Annotated[Path | None, typer.Option("-c", "--config", help="rack file instead of the recorded one")] = None,
     dem: Annotated[list[Path] | None, typer.Option(help="terrain instead of the recorded one; repeatable")] = None,
+    water: Annotated[list[Path] | None, typer.Option(help="water instead of the recorded one; repeatable")] = None,
     scheduler: Annotated[str | None, typer.Option(help="of a Dask cluster, such as tcp://127.0.0.1:8786")] = None,
 ) -> None:
     """Decode and judge all recordings below a directory again, on all cores of this machine or on a Dask cluster.
 
     The verdicts land in a Parquet data set. A second run does only what is new or has changed: the recording, the
-    configuration, the terrain, or this program.
+    configuration, the terrain, the water, or this program.
     """
     from gateway.reprocess.workers import get_ready
 
@@ -32,7 +33,7 @@ def reprocess(
     from gateway.reprocess.run import reprocess as bring_up_to_date
     from gateway.tables import plain_console, print_table
 
-    listed = jobs(directory, load_config(config) if config else None, dem or ())
+    listed = jobs(directory, load_config(config) if config else None, dem or (), water or ())
     data = DataSet(output)
     with Progress(console=plain_console(), transient=True) as bar:
         task = bar.add_task("recordings", total=len(listed))

@@ -12,6 +12,7 @@ def run(
     config: Annotated[Path | None, typer.Option("-c", "--config", help="rack file (TOML)")] = None,
     source: Annotated[list[str] | None, typer.Option(help="KIND:ADDRESS without a rack file; repeatable")] = None,
     dem: Annotated[list[Path] | None, typer.Option(help="terrain file; repeatable")] = None,
+    water: Annotated[list[Path] | None, typer.Option(help="water file; repeatable")] = None,
     record: Annotated[Path | None, typer.Option(help="directory for the recording")] = None,
     calibration: Annotated[Path | None, typer.Option(help="calibration file of the radar")] = None,
     json: Annotated[bool, typer.Option("--json", help="events as JSON lines")] = False,
@@ -36,9 +37,8 @@ def run(
     else:
         adapters = [{"name": f"bridge{k}", "source": text} for k, text in enumerate(source or [])]
         rack = check_config({"adapters": adapters}, "--source")
-    changes: dict[str, object] = {}
-    if dem:
-        changes["terrain"] = [path.absolute() for path in dem]
+    maps = {"terrain": dem, "water": water}
+    changes: dict[str, object] = {name: [path.absolute() for path in files] for name, files in maps.items() if files}
     if record:
         changes["recording"] = {
             **(rack.recording.model_dump() if rack.recording else {}),

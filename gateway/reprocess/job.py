@@ -37,13 +37,14 @@ COLUMNS = pa.schema([("recording", pa.string()), *OF_THE_SCAN, *VERDICTS])
 class Job(NamedTuple):
     """A recording, as the data set names it and where it is, and what replaces the configuration that it was made with.
 
-    `config` is a whole configuration as JSON, or empty; `terrain` are files, or none.
+    `config` is a whole configuration as JSON, or empty; `terrain` and `water` are files, or none.
     """
 
     name: str
     path: Path
     config: str = ""
     terrain: tuple[Path, ...] = ()
+    water: tuple[Path, ...] = ()
 
 
 class Outcome(NamedTuple):
@@ -63,7 +64,7 @@ def key(job: Job) -> str:
 
 
 def _key(recording: Recording, config: RackConfig, monitor: Monitor | None) -> str:
-    files = [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in recording.files]
+    files = [(str(path), *_size_and_change(path)) for path in recording.files]
     calibration = monitor.calibration.model_dump_json() if monitor and monitor.calibration else ""
     terrain = monitor.terrain.checksum if monitor else ""
     water = monitor.water.checksum if monitor and monitor.water else ""
@@ -112,31 +113,39 @@ def work(job: Job) -> Outcome:
 def set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
     """How a recording is to be read and judged. Raises GatewayError naming what is wrong."""
     recorded = recorded_config(recording.metadata)
-    config = RackConfig.model_validate_json(job.config) if job.config else recorded
+    config = (RackConfig.model_validate_json(job.config) if job.config else recorded).with_maps(job.terrain, job.water)
     names, given = ({adapter.name for adapter in one.adapters} for one in (recorded, config))
     if not names & given:
         raise GatewayError(
             f"{job.path} was recorded from {', '.join(sorted(names))}, and the rack file names none of them: "
             f"give one of its adapters ({', '.join(sorted(given))}) that name"
         )
-    maps = (*(job.terrain or config.terrain), *config.water, *((config.calibration,) if config.calibration else ()))
-    files = [(path, path.stat().st_mtime_ns) for path in maps if path.exists()]
+    maps = (*config.terrain, *config.water, *((config.calibration,) if config.calibration else ()))
+    files = [(path, *_size_and_change(path)) for path in maps if path.exists()]
     made_with = tuple((name, recording.metadata[name]) for name in MADE_WITH if name in recording.metadata)
-    return _made(job.config, job.terrain, made_with, tuple(files))
+    return _made(job.config, job.terrain, job.water, made_with, tuple(files))
 
 
 @lru_cache(maxsize=SET_UPS)
 def _made(
-    config: str, terrain: tuple[Path, ...], metadata: tuple[tuple[str, str], ...], _: tuple[tuple[Path, int], ...]
+    config: str,
+    terrain: tuple[Path, ...],
+    water: tuple[Path, ...],
+    metadata: tuple[tuple[str, str], ...],
+    _: tuple[tuple[Path, int, int], ...],
 ) -> tuple[RackConfig, Monitor | None]:
     """The same for all recordings that were made alike, as long as the files that it rests on are the same."""
     if not config:
-        recorded = recorded_config(dict(metadata))
-        return recorded, recorded_monitor(dict(metadata), recorded, terrain)
-    given = RackConfig.model_validate_json(config)
-    if terrain:
-        given = given.model_copy(update={"terrain": terrain})
+        recorded = recorded_config(dict(metadata)).with_maps(terrain, water)
+        return recorded, recorded_monitor(dict(metadata), recorded, terrain, water)
+    given = RackConfig.model_validate_json(config).with_maps(terrain, water)
     return given, build_monitor(given)
+
+
+def _size_and_change(path: Path) -> tuple[int, int]:
+    """While both are the same, a file counts as the same: bytes, and ns of its last change."""
+    found = path.stat()
+    return found.st_size, found.st_mtime_ns
 
 
 def _row(name: str, event: IntegrityEvent, scan: ScanEvent | None) -> dict[str, Any]:
@@ -157,13 +166,13 @@ def code_version() -> str:
     return digest.hexdigest()
 
 
-def jobs(source: Path, config: RackConfig | None, terrain: Iterable[Path]) -> list[Job]:
+def jobs(source: Path, config: RackConfig | None, terrain: Iterable[Path], water: Iterable[Path] = ()) -> list[Job]:
     """A job for each recording below a directory, or for one recording. Raises GatewayError if there is none."""
     directory = source.parent if source.is_file() else source
     paths = [source] if source.is_file() else [session[0] for session in sessions(directory.rglob("*.mcap"))]
     if not paths:
         raise GatewayError(f"{directory} holds no recordings (*.mcap): name the directory that they are in")
     written = json.dumps(config.model_dump(mode="json")) if config else ""
-    files = tuple(path.absolute() for path in terrain)
+    maps = [tuple(path.absolute() for path in files) for files in (terrain, water)]
     names = [path.relative_to(directory).with_suffix("").as_posix() for path in paths]
-    return [Job(name, path.absolute(), written, files) for name, path in zip(names, paths, strict=True)]
+    return [Job(name, path.absolute(), written, *maps) for name, path in zip(names, paths, strict=True)]

@@ -1,7 +1,12 @@
 """Words made for the tests straight from the standards' pictures of a word, one bit at a time, without the kernels."""
 
+import numpy as np
+import numpy.typing as npt
 from cobs import cobs
 
+# What makes a word of ARINC 708 unusual.
+LABEL, MODE, SPARE_11, SPARE_48, SPARE_63, RESERVED_LEVEL = (1 << bit for bit in range(6))
+PAYLOAD_708 = bytes.fromhex("88c6fa") * 64  # the levels 0 to 7, 64 times
 NORMAL_SSM = {"bnr": 3, "bcd": 0, "disc": 0}
 
 
@@ -28,6 +33,11 @@ def header708(**fields: int) -> bytes:
         for place in range(width):
             bits[first + place] = code >> place & 1
     return bytes(sum(bits[8 * byte + place] << place for place in range(8)) for byte in range(8))
+
+
+def words708(*headers: bytes, payload: bytes = PAYLOAD_708) -> npt.NDArray[np.uint8]:
+    """One word (200 bytes) for each header, all with the same bins."""
+    return np.frombuffer(b"".join(header + payload for header in headers), np.uint8).reshape(-1, 200)
 
 
 def frame(packet: bytes) -> bytes:

@@ -13,24 +13,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from decoders import formats, layouts
-from decoders.arinc708 import Header, Radials, headers, load_profile, misread_bits, unpack
-from decoders.kernels708_bins import mean_step
+from decoders.arinc708 import Header, Radials, headers, load_profile, unpack
 from decoders.racklink import Framer
 from simulators import racklink
-from tests.decoders.bus import header708
+from tests.decoders.bus import RESERVED_LEVEL, SPARE_11, SPARE_48, SPARE_63, header708, words708
 
-LABEL, MODE, SPARE_11, SPARE_48, SPARE_63, RESERVED_LEVEL = (1 << bit for bit in range(6))
 PROFILES = ["arinc708", "arinc708a", "wxr2100_6bit"]
-PAYLOAD = bytes.fromhex("88c6fa") * 64
 HEADERS = st.binary(min_size=8, max_size=8)
 
 
-def words(*headers: bytes, payload: bytes = PAYLOAD) -> npt.NDArray[np.uint8]:
-    return np.frombuffer(b"".join(header + payload for header in headers), np.uint8).reshape(-1, 200)
-
-
 def radial(**fields: int) -> Radials:
-    return unpack(words(header708(**fields)))
+    return unpack(words708(header708(**fields)))
 
 
 def scalars(radials: Radials) -> dict[str, float]:
@@ -38,7 +31,7 @@ def scalars(radials: Radials) -> dict[str, float]:
 
 
 def test_a_word_of_a_weather_radar_decodes_as_worked_out() -> None:
-    radials = unpack(words(bytes.fromhex("b443047a0e80767c")))
+    radials = unpack(words708(bytes.fromhex("b443047a0e80767c")))
     assert scalars(radials) == {
         "label": 0o055,
         "control_accept": 3,
@@ -59,7 +52,7 @@ def test_a_word_of_a_weather_radar_decodes_as_worked_out() -> None:
 
 
 def test_a_word_of_a_bench_generator_decodes_as_worked_out() -> None:
-    fields = scalars(unpack(words(bytes.fromhex("b4010001f817da03"))))
+    fields = scalars(unpack(words708(bytes.fromhex("b4010001f817da03"))))
     assert math.isnan(fields.pop("gain_db"))
     assert fields == {
         "label": 0o055,
@@ -79,7 +72,7 @@ def test_a_word_of_a_bench_generator_decodes_as_worked_out() -> None:
 
 @given(st.lists(HEADERS, min_size=1, max_size=8))
 def test_every_field_is_that_of_the_declared_layout(headers: list[bytes]) -> None:
-    radials = unpack(words(*headers))
+    radials = unpack(words708(*headers))
     for i, header in enumerate(headers):
         declared = layouts.RADAR_HEADER.parse(header)
         for name in (
@@ -119,11 +112,7 @@ def test_bin_k_is_its_own_bits_of_the_payload_least_significant_first(name: str,
     bits = int.from_bytes(payload, "little")
     size = profile.bits_per_bin
     expected = [bits >> (k * size) & (2**size - 1) for k in range(profile.bins)]
-    assert unpack(words(bytes(8), payload=payload), name).bins.tolist() == [expected]
-
-
-def test_the_six_bit_profile_cuts_the_same_payload_into_256_bins() -> None:
-    assert unpack(words(bytes(8)), "wxr2100_6bit").bins.tolist() == [[0o10, 0o32, 0o54, 0o76] * 64]
+    assert unpack(words708(bytes(8), payload=payload), name).bins.tolist() == [expected]
 
 
 def test_fault_a_tilt_of_minus_a_quarter_read_as_minus_1008() -> None:
@@ -149,8 +138,8 @@ def test_fault_spare_bit_48_leaks_into_the_range() -> None:
 )
 def test_spare_bits_change_no_field_and_are_flagged(spare: dict[str, int], flag: int) -> None:
     flagged, plain = (
-        unpack(words(header708(**spare), payload=bytes(192))),
-        unpack(words(header708(), payload=bytes(192))),
+        unpack(words708(header708(**spare), payload=bytes(192))),
+        unpack(words708(header708(), payload=bytes(192))),
     )
     assert plain.unusual[0] == 0
     assert scalars(flagged) == scalars(plain) | {"unusual": flag}
@@ -159,13 +148,13 @@ def test_spare_bits_change_no_field_and_are_flagged(spare: dict[str, int], flag:
 @pytest.mark.parametrize("field", ["range", "gain", "mode", "label"])
 def test_fault_a_code_that_is_not_listed_drops_the_radial(field: str) -> None:
     codes = range(2 ** formats.HEADER_708[field][1])
-    radials = unpack(words(*(header708(**{field: code}) for code in codes)))
+    radials = unpack(words708(*(header708(**{field: code}) for code in codes)))
     assert all(len(column) == len(codes) for column in radials)
     np.testing.assert_array_equal(radials.bins, np.tile(np.arange(8), (len(codes), 64)))
 
 
 def test_fault_a_payload_of_label_bytes_is_taken_for_headers() -> None:
-    radials = unpack(words(header708(range=8), payload=b"\xb4" * 192))
+    radials = unpack(words708(header708(range=8), payload=b"\xb4" * 192))
     assert (radials.label.tolist(), radials.range_nm.tolist()) == ([0o055], [40.0])
     assert radials.bins[0, :8].tolist() == [0xB4B4B4 >> (3 * k) & 7 for k in range(8)]
 
@@ -202,7 +191,7 @@ def test_fault_the_order_of_the_faults_is_a_constant() -> None:
 
 
 def test_fault_a_word_with_label_057_is_thrown_away() -> None:
-    radials = unpack(words(bytes.fromhex("f443047a0e80767c")))
+    radials = unpack(words708(bytes.fromhex("f443047a0e80767c")))
     assert (radials.label[0], radials.range_nm[0]) == (0o057, 160.0)
 
 
@@ -223,12 +212,6 @@ def test_the_scan_angle_is_clockwise_from_the_nose_and_never_180(code: int, angl
     assert radial(scan_angle=code).scan_angle_deg[0] == angle
 
 
-def test_a_profile_whose_scan_angle_starts_at_the_tail_is_turned_by_half_a_turn() -> None:
-    encoder = replace(load_profile("arinc708"), scan_angle_zero="tail")
-    turned = unpack(words(*(header708(scan_angle=code) for code in (0, 2048, 3072))), encoder)
-    assert turned.scan_angle_deg.tolist() == [-180.0, 0.0, 90.0]
-
-
 def test_the_first_bit_of_annunciations_and_faults_is_one() -> None:
     word = np.zeros((2, 200), np.uint8)
     word[0, 13 // 8] = 1 << 13 % 8
@@ -239,7 +222,7 @@ def test_the_first_bit_of_annunciations_and_faults_is_one() -> None:
 
 
 def test_arrays_have_their_declared_types_and_shapes() -> None:
-    radials = unpack(words(bytes(8), bytes(8)))
+    radials = unpack(words708(bytes(8), bytes(8)))
     types = {name: (column.dtype.str[1:], column.shape) for name, column in radials._asdict().items()}
     names = ["label", "control_accept", "annunciations", "faults", "mode", "data_accept", "unusual"]
     small = dict.fromkeys(names, ("u1", (2,)))
@@ -273,7 +256,7 @@ def test_words_that_are_no_bytes_and_unknown_profiles_are_refused() -> None:
 
 
 def test_strided_and_read_only_words_unpack_alike() -> None:
-    array = words(bytes.fromhex("b443047a0e80767c"), bytes(8))
+    array = words708(bytes.fromhex("b443047a0e80767c"), bytes(8))
     for form in (array, array.copy(), np.asfortranarray(array), np.repeat(array, 2, axis=0)[::2]):
         np.testing.assert_array_equal(unpack(form).bins, unpack(array.copy()).bins)
         assert unpack(form).tilt_deg.tolist() == [-3.25, 0.0]
@@ -304,63 +287,6 @@ def test_a_block_of_any_size_is_the_same_as_word_by_word(count: int) -> None:
         one = unpack(array[i : i + 1])
         for name in Radials._fields:
             np.testing.assert_array_equal(getattr(block, name)[i : i + 1], getattr(one, name))
-
-
-def test_labels_that_a_profile_does_not_name_are_carried_and_flagged() -> None:
-    found = headers(np.frombuffer(b"".join(header708(label=code) for code in range(256)), np.uint8).reshape(-1, 8))
-    assert found.label.tolist() == list(range(256))
-    assert {code for code in range(256) if not found.unusual[code] & LABEL} == {0o055, 0o057}
-
-
-@pytest.mark.parametrize(("name", "reserved"), [("arinc708", {7}), ("arinc708a", set()), ("wxr2100_6bit", {7})])
-def test_a_mode_without_a_meaning_is_carried_and_flagged(name: str, reserved: set[int]) -> None:
-    header = np.frombuffer(b"".join(header708(mode=code) for code in range(8)), np.uint8).reshape(-1, 8)
-    found = headers(header, name)
-    assert found.mode.tolist() == list(range(8))
-    assert {code for code in range(8) if found.unusual[code] & MODE} == reserved
-
-
-@pytest.mark.parametrize("bin_", [0, 1, 31, 32, 255, 511])
-@pytest.mark.parametrize("level", range(8))
-def test_a_reserved_level_in_any_bin_is_carried_and_flagged(level: int, bin_: int) -> None:
-    payload = (level << 3 * bin_).to_bytes(192, "little")
-    found = unpack(words(header708(), payload=payload))
-    assert found.bins[0, bin_] == level
-    assert np.count_nonzero(found.bins) == int(level > 0)
-    assert found.unusual[0] == (RESERVED_LEVEL if level == 5 else 0)
-
-
-def test_a_radar_with_several_reserved_levels_has_each_flagged_and_six_bits_have_none() -> None:
-    few = replace(load_profile("arinc708"), levels=("black", "green", "yellow", "red", *["reserved"] * 4))
-    payloads = [(level << 9).to_bytes(192, "little") for level in range(8)]
-    array = np.concatenate([words(header708(), payload=payload) for payload in payloads])
-    assert unpack(array, few).unusual.tolist() == [0] * 4 + [RESERVED_LEVEL] * 4
-    ramp = sum(level << (6 * level) for level in range(64)).to_bytes(192, "little")
-    assert unpack(words(header708(), payload=ramp), "wxr2100_6bit").unusual.tolist() == [0]
-
-
-@pytest.mark.parametrize(("zero", "start"), [("nose", 0.0), ("tail", 180.0)])
-@pytest.mark.parametrize(("sense", "sign"), [("clockwise", 1), ("counterclockwise", -1)])
-def test_every_scan_angle_counts_from_the_zero_and_in_the_sense_of_the_profile(
-    zero: str, start: float, sense: str, sign: int
-) -> None:
-    changes: dict[str, Any] = {"scan_angle_zero": zero, "scan_angle_sense": sense}
-    profile = replace(load_profile("arinc708"), **changes)
-    codes = range(4096)
-    array = np.frombuffer(b"".join(header708(scan_angle=code) for code in codes), np.uint8).reshape(-1, 8)
-    expected = [(start + sign * code * 360 / 4096 + 180) % 360 - 180 for code in codes]
-    assert headers(array, profile).scan_angle_deg.tolist() == expected
-
-
-@pytest.mark.parametrize("bits", [3, 6])
-@pytest.mark.parametrize("bins", [64, 72, 96, 128, 200, 256])
-def test_a_profile_of_another_word_length_unpacks_its_own_words(bins: int, bits: int) -> None:
-    base = load_profile({3: "arinc708", 6: "wxr2100_6bit"}[bits])
-    other = replace(base, word_bits=64 + bins * bits, bins=bins)
-    payload = np.random.default_rng(1).bytes(bins * bits // 8)
-    expected = [int.from_bytes(payload, "little") >> bits * k & 2**bits - 1 for k in range(bins)]
-    found = unpack(np.frombuffer(header708(range=4) + payload, np.uint8)[None], other)
-    assert (found.bins.tolist(), found.range_nm.tolist()) == ([expected], [20.0])
 
 
 def test_no_field_comes_out_that_is_not_declared() -> None:
@@ -400,18 +326,3 @@ def test_no_more_memory_is_taken_than_the_output_needs(
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < sum(getattr(found, name).nbytes for name in found._fields) + 50_000
-
-
-def test_bins_that_climb_and_fall_slowly_tell_whether_they_were_cut_at_the_wrong_bits() -> None:
-    slope = np.abs(np.arange(512) % 32 - 16).astype(np.uint8)  # 0 to 16 and back
-    six, three = np.tile(slope * 3, (20, 1)), np.tile(slope // 3, (20, 1))
-    assert [misread_bits(six), misread_bits(three)] == [None, None]
-    assert misread_bits(np.stack([six & 7, six >> 3], axis=-1).reshape(20, -1)) == 6
-    assert misread_bits(three[:, ::2] + np.uint8(8) * three[:, 1::2]) == 3
-
-
-def test_the_mean_step_is_that_of_numpy() -> None:
-    bins = np.random.default_rng(1).integers(0, 64, (9, 256)).astype(np.uint8)
-    for apart in (1, 2):
-        steps = bins[:, apart:].astype(int) - bins[:, :-apart]
-        assert mean_step(bins, apart) == np.abs(steps).mean()

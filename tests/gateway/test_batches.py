@@ -1,8 +1,9 @@
 """Many records at once say what they say one by one, however they are cut and whatever goes wrong on the way."""
 
+import json
 import struct
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from itertools import cycle
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from decoders import formats as f
 from decoders.framing import Packets
-from decoders.racklink import Framer, Packet
+from decoders.racklink import Framer, HelloChannel, Packet, hello
 from gateway.chunks import Block
 from gateway.config import check_config
 from gateway.link import Link
@@ -23,12 +24,29 @@ from gateway.records import Raw, Record, Status, Tick
 from simulators import racklink
 from simulators.link import whole_stream
 from simulators.scenario import BUILT_IN_TERRAIN, Radar, white_mountains
+from tests.decoders.bus import word429
 from tests.gateway.made import SECOND_NS, stamp
 
 SWEEP_S = 61 * 3 / 40
 CHUNK_NS = 10_000_000
-RADAR = 0  # its channel
+MID_SCAN_NS = 1_500_000_000  # of the first of two
+RADAR, IRU, BEHIND, RELIEF = 0, 1, 8, 9  # channels
+ADIRU = word429(0o377, {11: (0x038, 12)})
+OTHER_DATA = 0b11 << 24  # two bits, so that the parity stays right
 Change = Callable[[np.random.Generator, Packet], list[Packet]]
+
+
+def announcing(packet: Packet, channels: Iterable[HelloChannel]) -> Packet:
+    """A hello with other channels."""
+    said = hello(packet)
+    return packet._replace(body=racklink.hello(said.serial_number, said.firmware, [*channels]))
+
+
+def own(packet: Packet, name: str) -> Packet:
+    """A packet as a bridge sends it that has the radar, if it is the line's, or else all other channels."""
+    if packet.type != f.HELLO:
+        return packet
+    return announcing(packet, [said for said in hello(packet).channels if (said.channel == RADAR) == (name == "line")])
 
 
 def lost(random: np.random.Generator, packet: Packet) -> list[Packet]:
@@ -63,11 +81,58 @@ def radar_pauses(_: np.random.Generator, packet: Packet) -> list[Packet]:
     return [] if packet.channel == RADAR and SECOND_NS < packet.time_ns < 7.5 * SECOND_NS else [packet]
 
 
+def says_what_it_is(_: np.random.Generator, packet: Packet) -> list[Packet]:
+    """The radar alone is announced; the other buses begin in mid-scan, and label 377 says what they are."""
+    if packet.type == f.HELLO:
+        return [announcing(packet, [said for said in hello(packet).channels if said.channel == RADAR])]
+    return [packet] if packet.type != f.WORDS_429 or packet.time_ns > MID_SCAN_NS else []
+
+
+def is_relieved(_: np.random.Generator, packet: Packet) -> list[Packet]:
+    """A second IRU that nobody announced begins in mid-scan; the first falls silent, and in a later scan it is used."""
+    if packet.type != f.WORDS_429 or packet.channel != IRU:
+        return [packet]
+    first = [packet] if packet.time_ns < 3 * SECOND_NS else []
+    return first + ([packet._replace(channel=RELIEF)] if packet.time_ns > MID_SCAN_NS else [])
+
+
+def has_a_twin(_: np.random.Generator, packet: Packet) -> list[Packet]:
+    """Beside the IRU an ADIRU, on a channel with a lower number, that gives the same quantities other values.
+
+    Both begin in mid-scan. The IRU is announced, and is heard before the other one is known: so its words are used.
+    """
+    if packet.type == f.HELLO and packet.time_ns > SECOND_NS:
+        return []  # each has what waits be read
+    if packet.type == f.HELLO:
+        channels = hello(packet).channels
+        return [announcing(packet, [s._replace(channel=BEHIND) if s.channel == IRU else s for s in channels])]
+    if packet.type != f.WORDS_429 or packet.channel != IRU:
+        return [packet]
+    entries = np.frombuffer(packet.body, "<u4").reshape(-1, 2).copy()
+    words = entries[:, 1]
+    words[:] = np.where(words & 0xFF == 0o377, ADIRU, words ^ OTHER_DATA)
+    twin = packet._replace(body=entries.tobytes(), time_ns=packet.time_ns + 3_000_000)
+    iru = [packet._replace(channel=BEHIND)] if packet.time_ns > MID_SCAN_NS + SECOND_NS else []
+    return iru + ([twin] if packet.time_ns > MID_SCAN_NS else [])
+
+
 def as_it_is(_: np.random.Generator, packet: Packet) -> list[Packet]:
     return [packet]
 
 
-CHANGES: list[Change] = [as_it_is, lost, doubled, flagged, clock_jumps, cut_body, falls_silent, radar_pauses]
+CHANGES: list[Change] = [
+    as_it_is,
+    lost,
+    doubled,
+    flagged,
+    clock_jumps,
+    cut_body,
+    falls_silent,
+    radar_pauses,
+    says_what_it_is,
+    is_relieved,
+    has_a_twin,
+]
 
 
 @cache
@@ -87,7 +152,10 @@ def flown(change: Change, noise: float = 0.0) -> list[Record]:
             if packet.type in (f.WORDS_429, f.WORD_708) and (packet.channel == RADAR) != (name == "line"):
                 continue
             sequences[name] += 1
-            for p in change(random, packet):
+            before = None
+            for p in change(random, own(packet, name)):
+                sequences[name] += before not in (None, p)
+                before = p
                 sent = (p.type, p.channel, sequences[name], p.time_ns + (name == "net") * SECOND_NS, p.body, p.flags)
                 garbage = random.integers(0, 256, 9, np.uint8).tobytes() if random.random() < noise else b""
                 data = racklink.encode(*sent)
@@ -150,6 +218,29 @@ def test_where_nobody_asks_for_the_state_the_verdicts_and_counters_are_the_same(
     for sizes in ([1], [len(records)], [100]):
         lines = given(records, sizes, tells_state=False)
         assert [line for line in lines if any(kind in line for kind in judged)] == expected
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (says_what_it_is, {1: "iru_704", 2: "gnss_743a", 3: "ra_707"}),
+        (is_relieved, {RELIEF: "iru_704"}),
+        (has_a_twin, {IRU: "adiru_738"}),
+    ],
+)
+def test_a_channel_that_says_in_mid_scan_what_it_is_serves_the_scans_that_need_it(
+    change: Change, said: dict[int, str]
+) -> None:
+    """The first scan lacks the state on some radials; without the channel the second would on all of them."""
+    events = [json.loads(line) for line in given(flown(change), [1])]
+    told = {event["reason"]: at for at, event in enumerate(events) if event.get("state") == "IDENTIFIED"}
+    assert set(told) == {
+        f"label 377 says what channel {channel} is: read as {name} from now on" for channel, name in said.items()
+    }
+    assert max(told.values()) < next(at for at, event in enumerate(events) if event["type"] == "scan")
+    first, second = (event for event in events if event["type"] == "integrity")
+    assert any("of 61 radials" in reason for reason in first["reasons"])
+    assert min(first["n_pairs"], second["n_pairs"]) > 0
 
 
 def test_most_packets_of_a_flight_are_taken_many_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

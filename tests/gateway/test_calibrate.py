@@ -73,7 +73,7 @@ def test_recorded_flights_become_a_file_that_the_monitor_loads(flights: Path, tm
     for path in sorted(flights.glob("*.mcap")):
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         assert f"{path.stem} (1970-01-01 00:00:00 UTC, SHA-256 {digest[:16]}" in found.provenance
-    assert f"(CRC-32 {open_terrain(MOUNTAINS).checksum})" in found.provenance
+    assert f"(checksum {open_terrain(MOUNTAINS).checksum})" in found.provenance
     table = rows(run.stdout)
     head, *cells = table
     assert head[:3] == ["range limit (NM)", "shadow size (bins)", "residuals"]

@@ -74,6 +74,7 @@ def test_the_page_says_when_from_what_and_how_it_was_made(shown: Shown) -> None:
         assert all(f"{name} {metadata[name]}" in shown.page for name in VERSIONS)
     for text in (f"{calibration.name}: {calibration.provenance}", "robust", f"{demo.P_FA:g}", "N44W072.hgt"):
         assert f">{text}" in shown.page
+    assert "CRC" not in shown.page, "of wide terrain the checksum is of samples: the documents say of which"
 
 
 def test_every_figure_of_the_table_of_verdicts_has_its_unit_in_the_heading(shown: Shown) -> None:

@@ -7,13 +7,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import duckdb
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from gateway.config import check_config
+from gateway.errors import GatewayError
 from gateway.events import IntegrityEvent
 from gateway.metadata import recorded_config, recorded_monitor
 from gateway.recording import Recording
@@ -22,6 +26,8 @@ from gateway.reprocess import job as job_module
 from gateway.reprocess.dataset import DataSet
 from gateway.reprocess.job import Job, jobs, key, work
 from gateway.reprocess.run import reprocess
+from monitor.calibration import uncalibrated
+from simulators.scenario import BUILT_IN_TERRAIN
 from tests.gateway.flown import record_flight
 from tests.gateway.shell import shadebus
 
@@ -99,6 +105,87 @@ def test_only_what_is_new_or_has_changed_is_done_again(
     data.put(listed[1].name, work(listed[1]))
     monkeypatch.undo()
     assert not data.has(listed[1].name, partial(key, listed[1]))
+
+
+@dataclass
+class Changing:
+    """A recording to work out in this process by a rack file whose terrain and calibration are written anew."""
+
+    path: Path
+    directory: Path
+
+    @property
+    def job(self) -> Job:
+        table: dict[str, object] = {
+            "adapters": [{"name": "bridge", "source": "serial:x"}],
+            "terrain": [self.directory / "N44W072.hgt"],
+            "calibration": self.directory / "radar.json",
+        }
+        return Job("flight", self.path, json.dumps(check_config(table, "test").model_dump(mode="json")))
+
+    def raise_terrain(self, metres: int) -> None:
+        heights = np.fromfile(BUILT_IN_TERRAIN["white_mountains"], ">i2") + metres
+        heights.astype(">i2").tofile(self.directory / "N44W072.hgt")
+
+    def calibrate(self, name: str) -> None:
+        made = uncalibrated(512).model_copy(update={"name": name})
+        (self.directory / "radar.json").write_text(made.model_dump_json())
+
+    def outcome(self) -> tuple[set[str], bool, str]:
+        """What the verdicts say: their calibrations, and whether any finds the aircraft below ground; and the key."""
+        outcome = work(self.job)
+        assert outcome.whole["key"] == key(self.job)
+        rows = outcome.verdicts.to_pylist()
+        below = any("below the stored terrain" in reason for row in rows for reason in row["reasons"])
+        return {row["calibration"] for row in rows}, below, outcome.whole["key"]
+
+
+def test_a_worker_that_lives_on_takes_terrain_and_calibration_as_they_are_now(flights: Path, tmp_path: Path) -> None:
+    """And as they were again: what it keeps of a file is for that file."""
+    changing = Changing(flights / "flight0.mcap", tmp_path)
+    changing.raise_terrain(0)
+    changing.calibrate("first")
+    first = changing.outcome()
+    assert first[:2] == ({"first"}, False)
+    assert changing.outcome() == first
+
+    changing.calibrate("another")
+    calibrated = changing.outcome()
+    assert calibrated[:2] == ({"another"}, False)
+
+    changing.raise_terrain(1000)
+    raised = changing.outcome()
+    assert raised[:2] == ({"another"}, True)
+    assert len({first[2], calibrated[2], raised[2]}) == 3
+
+    changing.raise_terrain(0)
+    changing.calibrate("first")
+    assert changing.outcome() == first
+
+
+def test_a_file_of_another_size_is_another_one_whatever_its_time_of_change(flights: Path, tmp_path: Path) -> None:
+    """As where a copy keeps the time of its source."""
+    changing = Changing(flights / "flight0.mcap", tmp_path)
+    changing.raise_terrain(0)
+    found = []
+    for name in ("short", "much longer"):
+        changing.calibrate(name)
+        os.utime(tmp_path / "radar.json", ns=(1, 1))
+        found.append(changing.outcome())
+    assert [calibrations for calibrations, _, _ in found] == [{"short"}, {"much longer"}]
+    assert found[0][2] != found[1][2]
+
+
+def test_recordings_of_terrain_that_changes_meanwhile_are_refused_from_then_on(tmp_path: Path) -> None:
+    changing = Changing(tmp_path / "own.mcap", tmp_path)
+    changing.raise_terrain(0)
+    record_flight(changing.path, 5, 1, terrain=[tmp_path / "N44W072.hgt"])
+    as_recorded = Job("own", changing.path)
+    assert work(as_recorded).verdicts.num_rows == 1
+    changing.raise_terrain(1)
+    for ask in (work, key):
+        with pytest.raises(GatewayError, match=r"N44W072\.hgt changed since the recording was made"):
+            ask(as_recorded)
 
 
 def test_one_recording_that_cannot_be_worked_out_costs_no_other(flights: Path, tmp_path: Path) -> None:

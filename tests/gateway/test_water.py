@@ -5,15 +5,18 @@ import os
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from gateway.cli import app
 from gateway.config import RackConfig, check_config
 from gateway.errors import GatewayError
 from gateway.metadata import build_monitor, describe, recorded_config, recorded_monitor
 from gateway.recording import Recorder, Recording
 from gateway.recording.merging import merge
 from gateway.records import Stamp, Status
-from gateway.reprocess.job import Job, key
+from gateway.reprocess.job import Job, jobs, key, work
 from simulators.scenario import BUILT_IN_TERRAIN
+from tests.gateway.flown import record_flight
 from tests.gateway.shell import shadebus
 
 TERRAIN = BUILT_IN_TERRAIN["white_mountains"]
@@ -57,11 +60,63 @@ def test_water_that_has_changed_since_is_refused_by_name_with_other_terrain_too(
     recording = Recording(record(tmp_path / "r.mcap", rack([lake(tmp_path / "lake.geojson")])))
     lake(tmp_path / "lake.geojson", north=44.7)
     for terrain in ((), (TERRAIN,)):
-        with pytest.raises(GatewayError, match=r"lake\.geojson changed since the recording was made"):
+        with pytest.raises(GatewayError, match=r"lake\.geojson changed since the .*: name the water .* with --water"):
             recorded_monitor(recording.metadata, recorded_config(recording.metadata), terrain)
     (tmp_path / "lake.geojson").unlink()
     with pytest.raises(GatewayError, match=r"lake\.geojson cannot be read"):
         recorded_monitor(recording.metadata, recorded_config(recording.metadata))
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep with water that was recorded, and then drawn anew."""
+    directory = tmp_path_factory.mktemp("flown")
+    record_flight(directory / "flight.mcap", 1, 1, water=[lake(directory / "lake.geojson")])
+    lake(directory / "lake.geojson", north=44.7)
+    return directory / "flight.mcap"
+
+
+@pytest.fixture
+def sea(tmp_path: Path) -> Path:
+    """All that the aircraft sees."""
+    ring = [[-73, 43], [-70, 43], [-70, 46], [-73, 46], [-73, 43]]
+    path = tmp_path / "sea.geojson"
+    path.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    return path
+
+
+def test_a_replay_takes_other_water_by_name(flight: Path, sea: Path) -> None:
+    refused = shadebus("replay", flight)
+    assert (refused.returncode, "name the water to use with --water" in refused.stderr) == (1, True)
+    replayed = shadebus("replay", flight, "--json", "--water", sea)
+    assert replayed.returncode == 0, replayed.stderr
+    (told,) = (event for event in map(json.loads, replayed.stdout.splitlines()) if event["type"] == "integrity")
+    assert told["n_pairs"] == 0
+    assert any("do not count: over water" in reason for reason in told["reasons"])
+
+
+@pytest.mark.parametrize("config", [None, rack([])], ids=["as recorded", "by a rack file"])
+def test_recordings_are_worked_out_again_with_other_water(flight: Path, sea: Path, config: RackConfig | None) -> None:
+    (job,) = jobs(flight, config, (), [sea])
+    outcome = work(job)
+    assert outcome.verdicts["n_pairs"].to_pylist() == [0]
+    assert outcome.whole["key"] == key(job)
+    lake(sea)
+    assert work(job).verdicts["n_pairs"].to_pylist()[0] > 20
+    assert key(job) != outcome.whole["key"]
+
+
+def test_reprocess_and_run_hand_on_the_water_that_they_are_given(
+    flight: Path, tmp_path: Path, signals_left_alone: None
+) -> None:
+    missing = tmp_path / "no.geojson"
+    for verb in (
+        ("reprocess", flight.parent, "-o", tmp_path / "out"),
+        ("calibrate", "radar", flight, "-o", tmp_path / "radar.json"),
+        ("run", "--source", "serial:/dev/null", "--dem", TERRAIN),
+    ):
+        done = CliRunner().invoke(app, [*map(str, verb), "--water", str(missing)])
+        assert "no.geojson cannot be read" in str(done.exception)
 
 
 def test_a_recording_of_before_there_was_water_is_read_as_one_without(tmp_path: Path) -> None:

@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from monitor.scans import Scan
 from monitor.terrain import Terrain, open_terrain
+from tests.monitor.scanning import honest_scan
 
 # The first example of a run may compile a kernel, so a time limit on an example would measure the compiler.
 settings.register_profile("compiled", deadline=None)
@@ -37,3 +39,9 @@ def white_mountains(white_mountains_path: Path) -> Terrain:
 @pytest.fixture(scope="session")
 def sierra(sierra_path: Path) -> Terrain:
     return open_terrain(sierra_path)
+
+
+@pytest.fixture(scope="session")
+def honest(white_mountains: Terrain) -> Scan:
+    """A scan that agrees with the terrain to the bin."""
+    return honest_scan(white_mountains)

@@ -13,18 +13,11 @@ from monitor.radio_altitude import first_bins, too_high
 from monitor.scans import Scan
 from monitor.settings import MonitorSettings
 from monitor.terrain import Terrain
-from tests.monitor.test_integrity import ANGLES, CALIBRATED, MS, NO_COMPUTED_DATA, flying, judge, lit, scan_of
+from tests.monitor.scanning import ANGLES, CALIBRATED, MS, NO_COMPUTED_DATA, flying, judge
 
-HEADING_DEG, TILT_DEG = 197.6, -2.0
 N = len(ANGLES)
 LIMITED = MonitorSettings(radio_altitude_limit_m=762.0)  # 2,500 ft
 FROM_THERE = MonitorSettings(first_bin_from_radio_altitude=True)
-
-
-@pytest.fixture(scope="module")
-def honest(white_mountains: Terrain) -> Scan:
-    states = lit(white_mountains, np.radians(HEADING_DEG + ANGLES), np.full(N, np.radians(TILT_DEG)))
-    return scan_of(3 * (states > 0).astype(np.uint8))
 
 
 def over_ground(*height_m: float, status: int = 0) -> Aircraft:

@@ -3,22 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from monitor.scans import Scan
 from monitor.settings import MonitorSettings
 from monitor.shade import shadows
 from monitor.terrain import Terrain
-from tests.monitor.test_integrity import ANGLES, judge, lit, moved, scan_of
-
-HEADING_DEG, TILT_DEG = 197.6, -2.0
-
-
-@pytest.fixture(scope="module")
-def honest(white_mountains: Terrain) -> Scan:
-    """A scan that agrees with the terrain to the bin."""
-    states = lit(white_mountains, np.radians(HEADING_DEG + ANGLES), np.full(len(ANGLES), np.radians(TILT_DEG)))
-    return scan_of(3 * (states > 0).astype(np.uint8))
+from tests.monitor.scanning import ANGLES, judge, moved
 
 
 def test_first_against_first_has_one_pair_on_every_radial_with_shadows_in_both(

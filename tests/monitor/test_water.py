@@ -18,7 +18,7 @@ from monitor.settings import MonitorSettings
 from monitor.shade import shadows
 from monitor.terrain import Grid, Terrain
 from monitor.water import WaterError, WaterFiles, open_water
-from tests.monitor.test_integrity import ANGLES, CALIBRATED, HERE, flying, judge, lit, scan_of
+from tests.monitor.scanning import ANGLES, CALIBRATED, HERE, flying, judge
 
 # Posts 0.01 degrees apart at 45 N: 1.1 km southward and 0.79 km eastward, 0.876 square kilometres each.
 TERRAIN = Terrain(Grid(np.zeros((20, 30), np.float32), 45.1, 7.0, 0.01, 0.01), [], "")
@@ -192,12 +192,6 @@ def test_files_that_cannot_be_used_are_refused_by_name(tmp_path: Path) -> None:
     ):
         with pytest.raises(WaterError, match=f"{path.name} .*{why}"):
             open_water(path, TERRAIN, 1.0)
-
-
-@pytest.fixture(scope="module")
-def honest(white_mountains: Terrain) -> Scan:
-    states = lit(white_mountains, np.radians(HERE["heading_deg"] + ANGLES), np.full(len(ANGLES), np.radians(-2.0)))
-    return scan_of(3 * (states > 0).astype(np.uint8))
 
 
 def longitude_of(terrain: Terrain, azimuth_deg: float, range_m: float) -> float:

@@ -4,7 +4,6 @@ import shutil
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
-from math import radians
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +15,14 @@ from scipy.ndimage import gaussian_filter
 from monitor import terrain, terrain_files
 from monitor.integrity import Monitor
 from monitor.prediction import Beam, Pointing, predict
+from monitor.scans import Scan
 from monitor.settings import MonitorSettings
 from monitor.shade import DEM_SHADOW
 from monitor.terrain import Terrain, WideTerrain, open_terrain
 from monitor.terrain_files import TerrainError
 from monitor.warmup import warm_up
 from monitor.water import WaterError, open_water
-from tests.monitor.test_integrity import ANGLES, CALIBRATED, HERE, TILT_DEG, flying, lit, moved, scan_of
+from tests.monitor.scanning import CALIBRATED, flying, moved
 from tests.monitor.test_terrain import EAST, NORTH, SPACING, north_up, utm_plane, write
 from tests.monitor.test_water import square, written
 
@@ -207,13 +207,16 @@ SETTINGS = MonitorSettings(tracked_scans=2)
 
 
 def test_a_monitor_overpieces_judges_as_one_over_the_whole(
-    white_mountains: Terrain, white_mountains_path: Path, tmp_path: Path, wide: Wide, monkeypatch: pytest.MonkeyPatch
+    white_mountains: Terrain,
+    white_mountains_path: Path,
+    honest: Scan,
+    tmp_path: Path,
+    wide: Wide,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """An alert with its offset search, tracked shadows and water, and an aircraft outside the files."""
     monkeypatch.setattr(terrain, "BLOCK_DEG", 0.125)
     found = wide(white_mountains_path, 10**6)
-    states = lit(white_mountains, np.radians(HERE["heading_deg"] + ANGLES), np.full(len(ANGLES), radians(TILT_DEG)))
-    honest = scan_of(3 * (states > 0).astype(np.uint8))
     lake = written(tmp_path / "lake.geojson", square(-72.1, 43.9, -71.8, 45.1))
     verdicts: dict[Terrain, list[object]] = {white_mountains: [], found: []}
     for stored, said in verdicts.items():
@@ -233,20 +236,18 @@ def test_a_monitor_overpieces_judges_as_one_over_the_whole(
 
 
 def test_a_file_that_is_lost_in_flight_makes_a_verdict_and_ends_nothing(
-    white_mountains: Terrain, white_mountains_path: Path, tmp_path: Path, wide: Wide
+    white_mountains_path: Path, honest: Scan, tmp_path: Path, wide: Wide
 ) -> None:
     path = Path(shutil.copy(white_mountains_path, tmp_path / "N44W072.hgt"))
-    states = lit(white_mountains, np.radians(HERE["heading_deg"] + ANGLES), np.full(len(ANGLES), radians(TILT_DEG)))
-    scan = scan_of(3 * (states > 0).astype(np.uint8))
     water = written(tmp_path / "lake.geojson", square(-71.3, 44.1, -71.2, 44.2))
     found = wide(path)
     monitor = Monitor(found, None, CALIBRATED, open_water(water, found, 1.0))
     path.unlink()
-    verdict, comparison = monitor.judge(scan, flying())
+    verdict, comparison = monitor.judge(honest, flying())
     assert (verdict.verdict, comparison) == ("unavailable", None)
     assert "N44W072.hgt does not exist" in verdict.reasons[0]
     shutil.copy(white_mountains_path, path)
-    assert monitor.judge(scan, flying())[0].verdict == "ok"
+    assert monitor.judge(honest, flying())[0].verdict == "ok"
 
 
 def test_a_monitor_is_warmed_up_without_the_terrain_s_files(
