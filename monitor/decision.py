@@ -1,12 +1,11 @@
 """The tests of one sample, each with its share of the probability of a false alert.
 
 The statistic, T as published or the robust Q, looks at the sizes of the disparities of pairs, and the shift statistic
-at their directions, over some scans together. The unmatched shares look at shadows without a partner, so they see what
-is too far off to pair, and may alert where there are too few pairs for the others. Small shadows come and go with the
-roughness of the ground and are not counted, and a weak signal makes radar shadows where the terrain has none. The
-shares scatter more than a binomial would, since shadows of a scan stand or fall together: the threshold is a quantile
-of the beta-binomial distribution with the mean m that calibration found, and of the share the variance
-m (1 - m) (1 / n + rho).
+at their directions. The unmatched shares look at shadows without a partner, so they see what is too far off to pair,
+and may alert where there are too few pairs for the others. Small shadows come and go with the roughness of the ground
+and are not counted, and a weak signal makes radar shadows where the terrain has none. The shares scatter more than a
+binomial would, since shadows of a scan stand or fall together: the threshold is a quantile of the beta-binomial
+distribution with the mean m that calibration found, and of the share the variance m (1 - m) (1 / n + rho).
 """
 
 from dataclasses import dataclass
@@ -69,15 +68,15 @@ class Findings:
         ]
 
 
-def examine(sample: ScanSample, recent: ScanSample, settings: MonitorSettings, calibration: Calibration) -> Findings:
-    """Put a sample to every test that it and the calibration allow, and recent scans to that for a shift."""
+def examine(sample: ScanSample, settings: MonitorSettings, calibration: Calibration) -> Findings:
+    """Put a sample to every test that it and the calibration allow."""
     d, c = sample.disparities, calibration
     p_fa, p_fa_shift, p_fa_radar, p_fa_dem = _shares(settings, calibration)
     radar = _unmatched(RADAR_SHARE, sample.unmatched_radar, c.unmatched_radar, p_fa_radar)
     dem = _unmatched(DEM_SHARE, sample.unmatched_dem, c.unmatched_dem, p_fa_dem)
-    shift = _shift(recent, c, p_fa_shift) if len(recent.disparities) >= settings.pairs_needed else None
     if len(d) < settings.pairs_needed:
-        return Findings(None, f"{len(d)} pairs of shadows, {settings.pairs_needed} needed", shift, radar, dem)
+        return Findings(None, f"{len(d)} pairs of shadows, {settings.pairs_needed} needed", None, radar, dem)
+    shift = _shift(sample, c, p_fa_shift)
     q = robust_statistic(d, c.median_bins, c.clip_bins, c.sigma_bins)
     t = normalised(d, c.rms_bins)
     if settings.method == "robust":

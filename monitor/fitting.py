@@ -15,7 +15,7 @@ from scipy.special import ndtri
 from monitor.calibration import CLIP_FACTOR, Calibration, CheckedRate, LevelLimits, UnmatchedModel
 from monitor.decision import examine
 from monitor.disparity import clipped, robust_statistic
-from monitor.sample import ScanSample, Unmatched, with_those_before
+from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
 from monitor.shift import common_error
 
@@ -70,18 +70,14 @@ def fit(
         unmatched_dem=_shares([scan.unmatched_dem for scan in usable]),
         level=_levels(np.array([scan.level for scan in usable])),
     )
-    return made.model_copy(update={"checked": tuple(_checked(check, made, settings, p_fa) for p_fa in p_fas)})
+    held_out = [scan for scan in check if len(scan.disparities) >= minimum_pairs]
+    return made.model_copy(update={"checked": tuple(_checked(held_out, made, settings, p_fa) for p_fa in p_fas)})
 
 
 def _checked(scans: Sequence[ScanSample], made: Calibration, settings: MonitorSettings, p_fa: float) -> CheckedRate:
     asked = settings.model_copy(update={"p_fa": p_fa})
-    usable = [
-        (scan, recent)
-        for scan, recent in zip(scans, with_those_before(scans, settings.shift_scans), strict=True)
-        if len(scan.disparities) >= settings.pairs_needed
-    ]
-    alerts = sum(bool(examine(scan, recent, asked, made).alerts) for scan, recent in usable)
-    return CheckedRate(p_fa=p_fa, scans=len(usable), alerts=alerts)
+    alerts = sum(bool(examine(scan, asked, made).alerts) for scan in scans)
+    return CheckedRate(p_fa=p_fa, scans=len(scans), alerts=alerts)
 
 
 def _shares(found: Sequence[Unmatched]) -> UnmatchedModel | None:

@@ -64,11 +64,8 @@ class Monitor:
 
     def forget(self) -> None:
         """Forget the scans before, as after a clock that began anew; an alert goes on standing."""
-        self._begin_window()
+        self._window = Window(self.settings.window_scans)
         self._tracker = ShadowTracker(self.settings.tracked_scans)
-
-    def _begin_window(self) -> None:
-        self._window = Window(max(self.settings.window_scans, self.settings.shift_scans))
 
     def judge(self, scan: Scan, aircraft: Aircraft) -> tuple[Verdict, Comparison | None]:
         """The verdict on a scan; the comparison is None where the radar or the state did not allow one."""
@@ -152,17 +149,14 @@ class Monitor:
         bins = scan.bins.shape[1]
         now_ns, setting = int(scan.time_ns[-1]), (scan.range_nm, bins)
         calibration = self.calibration or uncalibrated(bins)
-        sample = recent = comparison.sample(scan)
-        scans = 1
+        sample, scans = comparison.sample(scan), 1
         unlike = self._unlike_calibration(sample)
         if unlike or doubts:  # which no scan to come may inherit
-            self._begin_window()
+            self._window = Window(self.settings.window_scans)
         else:
-            self._window.add(now_ns, setting, sample)
             needed = pairs_for_verdict(self.settings, calibration)
-            sample, scans = self._window.gather(self.settings.window_scans, needed)
-            recent = self._window.last(max(scans, self.settings.shift_scans))
-        findings = examine(sample, recent, self.settings, calibration)
+            sample, scans = self._window.gather(now_ns, setting, sample, needed)
+        findings = examine(sample, self.settings, calibration)
         if findings.alerts:
             verdict, first = UNAVAILABLE if unlike else ALERT, [str(test) for test in findings.alerts]
         elif findings.statistic is None:

@@ -45,11 +45,6 @@ def together(samples: Sequence[ScanSample]) -> ScanSample:
     )
 
 
-def with_those_before(samples: Sequence[ScanSample], scans: int) -> list[ScanSample]:
-    """For each of several scans in order, so many that end with it together, or as many as there are."""
-    return [together(samples[max(0, k + 1 - scans) : k + 1]) for k in range(len(samples))]
-
-
 def signal_level(bins: NDArray[np.uint8]) -> float:
     """The mean level of what is lit in the farther half of the range bins (n, M); NaN where nothing is.
 

@@ -35,9 +35,6 @@ class MonitorSettings(BaseModel):
     window_scans: int = Field(
         1, ge=1, le=30, description="scans whose pairs may be gathered where one has too few for a verdict"
     )
-    shift_scans: int = Field(
-        2, ge=1, le=30, description="the newest scans whose pairs the test for a shift looks at together"
-    )
     alert_scans: int = Field(1, ge=1, le=30, description="scans in a row beyond a threshold that make an alert")
     clear_scans: int = Field(1, ge=1, le=30, description="scans in a row within the thresholds that end an alert")
     offset_search_m: float = Field(

@@ -73,7 +73,7 @@ def _false_alerts(fitted: Sequence[Flown], flown: Sequence[Flown], calibrations:
         scans = false_alerts.scans_of(_flown(name, [kind], OTHERS, CALIBRATING_SCANS, SEED_OTHERS))
         measured += false_alerts.rows(f"{name}, by {WHITE_MOUNTAINS}", scans, ways)
         level = home.level
-        valid = [seen for seen in scans if level and level.lowest <= seen.scan.level <= level.highest]
+        valid = [scan for scan in scans if level and level.lowest <= scan.level <= level.highest]
         default = {false_alerts.DEFAULT: ways[false_alerts.DEFAULT]}
         measured += false_alerts.rows(f"the same, where the level check lets {len(valid)} pass", valid, default)
     return (

@@ -6,6 +6,7 @@ from benchmarks.evidence.faults import NONE
 from benchmarks.evidence.flown import Flown
 from benchmarks.evidence.tables import share, table
 from monitor.calibration import Calibration
+from monitor.decision import examine
 from monitor.settings import MonitorSettings
 
 HEIGHTS_M = ((0, 300), (300, 500), (500, 700), (700, 1000), (1000, 2000))
@@ -20,10 +21,10 @@ def page(flown: Sequence[Flown], calibrations: dict[str, Calibration]) -> str:
         cells = []
         for smooth, rough in ROUGHNESS_M:
             scans = [
-                seen.examined(SETTINGS, calibrations[flight.kind.terrain]).statistic is not None
+                examine(scan, SETTINGS, calibrations[flight.kind.terrain]).statistic is not None
                 for flight in flown
                 if low <= flight.height_above_ground_m < high and smooth <= flight.roughness_m < rough
-                for seen in flight.seen(NONE.name)
+                for scan in flight.samples[NONE.name]
             ]
             cells.append(share(sum(scans), len(scans)))
         rows.append([f"{low} to {high} m above ground", *cells])

@@ -7,10 +7,10 @@ import numpy as np
 from scipy.special import ndtri
 
 from benchmarks.evidence.faults import FAULTS, NONE, SCAN_S
-from benchmarks.evidence.flown import TERRAINS, Flown, Seen
+from benchmarks.evidence.flown import TERRAINS, Flown
 from benchmarks.evidence.tables import share, table
 from monitor.calibration import Calibration
-from monitor.decision import Findings
+from monitor.decision import Findings, examine
 from monitor.disparity import minimum_detectable_bias
 from monitor.sample import ScanSample
 from monitor.settings import MonitorSettings
@@ -24,19 +24,19 @@ SHIFTS_M = (50, 100, 200, 500)
 WAYS = ("T as published", "Q", "shift", "unmatched", "mean", "default")
 
 
-def _by_test(seen: Seen, calibration: Calibration) -> dict[str, bool]:
+def _by_test(scan: ScanSample, calibration: Calibration) -> dict[str, bool]:
     """What each test alone, at the whole P_FA, and the default say."""
-    paper = seen.examined(MonitorSettings(p_fa=P_FA, method="paper"), calibration)
-    alone = seen.examined(MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_dem_budget=0.0), calibration)
-    shift = seen.examined(MonitorSettings(p_fa=P_FA, shift_budget=0.95, unmatched_dem_budget=0.0), calibration)
-    shares = seen.examined(MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_dem_budget=0.95), calibration)
-    default = seen.examined(MonitorSettings(p_fa=P_FA), calibration)
+    paper = examine(scan, MonitorSettings(p_fa=P_FA, method="paper"), calibration)
+    alone = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_dem_budget=0.0), calibration)
+    shift = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.95, unmatched_dem_budget=0.0), calibration)
+    shares = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_dem_budget=0.95), calibration)
+    default = examine(scan, MonitorSettings(p_fa=P_FA), calibration)
     verdicts = (
         bool(paper.alerts),
         _statistic(alone),
         shift.shift is not None and shift.shift.exceeded,
         shares.unmatched_dem is not None and shares.unmatched_dem.exceeded,
-        _mean(seen.scan, calibration),
+        _mean(scan, calibration),
         bool(default.alerts),
     )
     return dict(zip(WAYS, verdicts, strict=True))
@@ -65,7 +65,8 @@ def by_fault(flown: Sequence[Flown], calibrations: dict[str, Calibration]) -> st
     rows = []
     for fault in FAULTS:
         said = [
-            [_by_test(scan, calibrations[flight.kind.terrain]) for scan in flight.seen(fault.name)] for flight in enough
+            [_by_test(scan, calibrations[flight.kind.terrain]) for scan in flight.samples[fault.name]]
+            for flight in enough
         ]
         shares = [_found(said, way) for way in WAYS]
         over = [
@@ -92,7 +93,7 @@ def by_pairs(flown: Sequence[Flown], calibrations: dict[str, Calibration]) -> st
         cells = []
         for shift in SHIFTS_M:
             scans = [
-                (Seen(scan, scan), calibrations[flight.kind.terrain])
+                (scan, calibrations[flight.kind.terrain])
                 for flight in flown
                 for scan in flight.samples[f"terrain shifted {shift} m"]
                 if low <= len(scan.disparities) < high

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from benchmarks.evidence.flown import Flown, Seen
+from benchmarks.evidence.flown import Flown
 from benchmarks.evidence.tables import rate, table
 from monitor.calibration import Calibration
-from monitor.decision import unmatched_threshold
+from monitor.decision import examine, unmatched_threshold
 from monitor.disparity import robust_statistic
 from monitor.fitting import fit
+from monitor.sample import ScanSample
 from monitor.settings import MonitorSettings
 from monitor.shift import shift_statistic, shift_threshold
 
@@ -23,23 +24,23 @@ SIGNIFICANCE = 0.01
 
 DEFAULT = "the default: Q, shift and unmatched terrain shadows"
 
-Alerts = Callable[[Seen, float], bool]
+Alerts = Callable[[ScanSample, float], bool]
 
 
-def scans_of(flown: Sequence[Flown], fault: str = "none 0") -> list[Seen]:
+def scans_of(flown: Sequence[Flown], fault: str = "none 0") -> list[ScanSample]:
     """All scans of the flights that have enough pairs."""
-    every = chain.from_iterable(flight.seen(fault) for flight in flown)
-    return [seen for seen in every if len(seen.scan.disparities) >= MINIMUM_PAIRS]
+    every = chain.from_iterable(flight.samples[fault] for flight in flown)
+    return [scan for scan in every if len(scan.disparities) >= MINIMUM_PAIRS]
 
 
 def calibrated(flown: Sequence[Flown], name: str) -> Calibration:
     """A calibration from flights: every second one fits, the others check."""
-    fitting, checking = ([seen.scan for seen in scans_of(some)] for some in (flown[::2], flown[1::2]))
+    fitting, checking = scans_of(flown[::2]), scans_of(flown[1::2])
     settings = MonitorSettings(minimum_pairs=MINIMUM_PAIRS)
     return fit(fitting, checking, P_FAS, settings, name=name, provenance="evidence", bins=512, range_nm=10.0)
 
 
-def tests(calibration: Calibration, pool: Sequence[Seen]) -> dict[str, Alerts]:
+def tests(calibration: Calibration, pool: Sequence[ScanSample]) -> dict[str, Alerts]:
     """Each way to decide, by name."""
     return {
         "T as published": _decision(calibration, method="paper"),
@@ -52,9 +53,9 @@ def tests(calibration: Calibration, pool: Sequence[Seen]) -> dict[str, Alerts]:
 
 
 def _decision(calibration: Calibration, **options: str | float) -> Alerts:
-    def alerts(seen: Seen, p_fa: float) -> bool:
+    def alerts(scan: ScanSample, p_fa: float) -> bool:
         settings = MonitorSettings.model_validate({"p_fa": p_fa, "minimum_pairs": MINIMUM_PAIRS, **options})
-        return bool(seen.examined(settings, calibration).alerts)
+        return bool(examine(scan, settings, calibration).alerts)
 
     return alerts
 
@@ -67,10 +68,10 @@ class Shift:
             raise ValueError(f"calibration {calibration.name} has no common error: fit one")
         self._calibration, self._common = calibration, calibration.common_error_bins
 
-    def __call__(self, seen: Seen, p_fa: float) -> bool:
+    def __call__(self, scan: ScanSample, p_fa: float) -> bool:
         """Whether it exceeds its threshold."""
         c, common = self._calibration, self._common
-        d, azimuth = seen.recent.disparities, seen.recent.azimuth_rad
+        d, azimuth = scan.disparities, scan.azimuth_rad
         return shift_statistic(d, azimuth, c.median_bins, c.clip_bins, c.sigma_bins, common) > shift_threshold(p_fa)
 
 
@@ -82,35 +83,35 @@ class Unmatched:
             raise ValueError(f"calibration {calibration.name} has no unmatched terrain shadows: fit one")
         self._model = calibration.unmatched_dem
 
-    def __call__(self, seen: Seen, p_fa: float) -> bool:
+    def __call__(self, scan: ScanSample, p_fa: float) -> bool:
         """Whether it exceeds its threshold."""
-        found = seen.scan.unmatched_dem
+        found = scan.unmatched_dem
         return found.share is not None and found.share > unmatched_threshold(found.eligible, self._model, p_fa)
 
 
 class Bootstrap:
     """The empirical threshold of Q: disparities of one fault-free scan drawn again and again, with replacement."""
 
-    def __init__(self, calibration: Calibration, pool: Sequence[Seen]) -> None:
+    def __init__(self, calibration: Calibration, pool: Sequence[ScanSample]) -> None:
         self._calibration = calibration
-        self._pool = [seen.scan.disparities for seen in pool]
+        self._pool = [scan.disparities for scan in pool]
         self._drawn: dict[int, NDArray[np.float64]] = {}
 
-    def __call__(self, seen: Seen, p_fa: float) -> bool:
+    def __call__(self, scan: ScanSample, p_fa: float) -> bool:
         """Whether Q of a scan is above all but that share of those drawn."""
-        n = len(seen.scan.disparities)
+        n = len(scan.disparities)
         if n not in self._drawn:
             rng = np.random.default_rng(n)
             picks = rng.integers(len(self._pool), size=DRAWS)
             self._drawn[n] = np.array([self._q(rng.choice(self._pool[k], n)) for k in picks])
-        return self._q(seen.scan.disparities) > float(np.quantile(self._drawn[n], 1 - p_fa))
+        return self._q(scan.disparities) > float(np.quantile(self._drawn[n], 1 - p_fa))
 
     def _q(self, d: NDArray[np.float64]) -> float:
         c = self._calibration
         return robust_statistic(d, c.median_bins, c.clip_bins, c.sigma_bins)
 
 
-def rows(name: str, scans: Sequence[Seen], ways: dict[str, Alerts]) -> list[list[str]]:
+def rows(name: str, scans: Sequence[ScanSample], ways: dict[str, Alerts]) -> list[list[str]]:
     """A row for each way to decide, with the rate at each P_FA and whether it is what was asked for."""
     found = []
     for way, alerts in ways.items():

@@ -5,7 +5,6 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,11 +12,9 @@ from benchmarks.evidence.faults import FAULTS, NONE, Fault
 from gateway.config import check_config
 from gateway.pipeline import Pipeline
 from gateway.records import Raw, Stamp
-from monitor.calibration import Calibration
 from monitor.comparison import Comparison
-from monitor.decision import Findings, examine
 from monitor.integrity import Monitor
-from monitor.sample import NOTHING, ScanSample, with_those_before
+from monitor.sample import NOTHING, ScanSample
 from monitor.scans import Scan
 from monitor.settings import MonitorSettings
 from monitor.terrain import Grid, Terrain, open_terrain
@@ -47,17 +44,6 @@ class Kind:
     post_noise_m: float = 3.0
 
 
-class Seen(NamedTuple):
-    """A scan, and with those before it what the test for a shift looks at."""
-
-    scan: ScanSample
-    recent: ScanSample
-
-    def examined(self, settings: MonitorSettings, calibration: Calibration) -> Findings:
-        """What the tests say."""
-        return examine(self.scan, self.recent, settings, calibration)
-
-
 @dataclass(frozen=True)
 class Flown:
     """One flight: for each fault what every scan gave, how high it was, and how rough the ground below."""
@@ -66,11 +52,6 @@ class Flown:
     samples: dict[str, list[ScanSample]]
     height_above_ground_m: float
     roughness_m: float
-
-    def seen(self, fault: str) -> list[Seen]:
-        """The scans under a fault, in order."""
-        scans = self.samples[fault]
-        return [Seen(*both) for both in zip(scans, with_those_before(scans, SETTINGS.shift_scans), strict=True)]
 
 
 def fly(kinds: Sequence[Kind], flights: int, scans: int, seed: int, faults: Sequence[Fault] = (NONE,)) -> list[Flown]:

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import betabinom, binom, chi2
 
 from monitor.calibration import Calibration, UnmatchedModel
-from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, examine, pairs_for_verdict, unmatched_threshold
-from monitor.sample import ScanSample, Unmatched, together
+from monitor.decision import DEM_SHARE, RADAR_SHARE, examine, pairs_for_verdict, unmatched_threshold
+from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
 
 MODEL = UnmatchedModel(mean=0.3, overdispersion=0.02)
@@ -28,11 +28,6 @@ FEW, MANY = Unmatched(10, 50), Unmatched(45, 50)
 
 def sample(n: int = 40, d: float = 1.0, radar: Unmatched = FEW, dem: Unmatched = FEW) -> ScanSample:
     return ScanSample(np.full(n, d), np.linspace(-np.pi, np.pi, n), radar, dem, 2.0)
-
-
-def examined(one: ScanSample, settings: MonitorSettings, calibration: Calibration) -> Findings:
-    """Of a first scan, before which there are none."""
-    return examine(one, one, settings, calibration)
 
 
 @pytest.mark.parametrize("eligible", [2, 3, 5, 8, 20, 60, 200])
@@ -69,7 +64,7 @@ def test_a_share_of_few_shadows_cannot_exceed_its_threshold() -> None:
 
 def test_the_probability_of_a_false_alert_is_split_among_the_tests() -> None:
     settings = MonitorSettings(p_fa=1e-3, shift_budget=0.5, unmatched_dem_budget=0.3, unmatched_radar_budget=0.1)
-    found = examined(sample(), settings, CALIBRATION)
+    found = examine(sample(), settings, CALIBRATION)
     assert found.statistic is not None
     assert found.shift is not None
     assert found.unmatched_radar is not None
@@ -91,7 +86,7 @@ def test_the_probability_of_a_false_alert_is_split_among_the_tests() -> None:
 def test_the_statistic_has_it_all_where_it_is_the_only_test(
     settings: MonitorSettings, calibration: Calibration
 ) -> None:
-    found = examined(sample(dem=MANY), settings, calibration)
+    found = examine(sample(dem=MANY), settings, calibration)
     assert found.statistic is not None
     assert found.statistic.limit == pytest.approx(chi2.isf(1e-3, 40))
     assert not found.alerts
@@ -99,38 +94,27 @@ def test_the_statistic_has_it_all_where_it_is_the_only_test(
 
 def test_unmatched_shadows_alert_alone_where_there_are_too_few_pairs_for_the_statistic() -> None:
     settings = MonitorSettings(p_fa=1e-3, shift_budget=0.5, unmatched_radar_budget=0.1)
-    found = examined(sample(n=3, radar=MANY), settings, CALIBRATION)
+    found = examine(sample(n=3, radar=MANY), settings, CALIBRATION)
     assert found.statistic is None
     assert found.blind == "3 pairs of shadows, 16 needed"
     assert [test.name for test in found.alerts] == [RADAR_SHARE]
-    assert [test.name for test in examined(sample(dem=MANY), settings, CALIBRATION).alerts] == [DEM_SHARE]
-    assert not examined(sample(radar=MANY), MonitorSettings(p_fa=1e-3), CALIBRATION).alerts  # told, not tested
+    assert [test.name for test in examine(sample(dem=MANY), settings, CALIBRATION).alerts] == [DEM_SHARE]
+    assert not examine(sample(radar=MANY), MonitorSettings(p_fa=1e-3), CALIBRATION).alerts  # told, not tested
     assert str(found.alerts[0]).startswith("the unmatched share of radar shadows 0.9 exceeds 0.")
 
 
 def test_disparities_that_follow_the_cosine_of_the_azimuth_alert_where_their_squares_do_not() -> None:
     shifted = sample()._replace(disparities=3 * np.cos(sample().azimuth_rad))
-    found = examined(shifted, MonitorSettings(p_fa=1e-3), CALIBRATION)
+    found = examine(shifted, MonitorSettings(p_fa=1e-3), CALIBRATION)
     assert [test.name for test in found.alerts] == ["the shift statistic"]
-    assert not examined(shifted, MonitorSettings(p_fa=1e-3), BARE).alerts
-
-
-def test_a_shift_is_sought_in_recent_scans_together() -> None:
-    """Two scans with fewer pairs than one needs tell nothing each, but together."""
-    few = sample(n=13)._replace(disparities=3 * np.cos(sample(n=13).azimuth_rad))
-    settings = MonitorSettings(p_fa=1e-3)
-    assert examined(few, settings, CALIBRATION).shift is None
-    both = examine(few, together([few, few]), settings, CALIBRATION)
-    assert both.statistic is None
-    assert both.shift == examined(together([few, few]), settings, CALIBRATION).shift
-    assert both.shift is not None
+    assert not examine(shifted, MonitorSettings(p_fa=1e-3), BARE).alerts
 
 
 def test_q_and_t_are_both_told_whatever_decides() -> None:
     """Forty pairs, three bins apart: Q = 40 9 / 4 and N T / sigma^2 = 40 9 / 16."""
-    found = examined(sample(d=3.0), MonitorSettings(p_fa=1e-3), BARE)
+    found = examine(sample(d=3.0), MonitorSettings(p_fa=1e-3), BARE)
     assert (found.q, found.t_normalised) == (90.0, 22.5)
     assert [test.value for test in found.alerts] == [90.0]
-    paper = examined(sample(d=3.0), MonitorSettings(p_fa=1e-3, method="paper"), BARE)
+    paper = examine(sample(d=3.0), MonitorSettings(p_fa=1e-3, method="paper"), BARE)
     assert paper.statistic is not None
     assert (paper.statistic.value, paper.q, paper.alerts) == (22.5, 90.0, [])

@@ -28,7 +28,6 @@ IMPOSSIBLE: list[tuple[str, list[Any], str]] = [
     ("shift_budget", [-0.1, 0.96, nan, inf], "(greater than or equal to 0|less than or equal to 0.95)"),
     ("shift_budget", [0.65], "shift_budget and the unmatched budgets are 1 together: leave Q 0.05"),
     ("unmatched_size", [0, -1, 10**30], "(greater than or equal to 1|less than or equal to 65536)"),
-    ("shift_scans", [0, 31], "(greater than or equal to 1|less than or equal to 30)"),
     ("window_scans", [0, 31], "(greater than or equal to 1|less than or equal to 30)"),
     ("alert_scans", [0, 31], "(greater than or equal to 1|less than or equal to 30)"),
     ("clear_scans", [0, 31], "(greater than or equal to 1|less than or equal to 30)"),

@@ -15,27 +15,25 @@ def scan(pairs: int, mark: float) -> ScanSample:
     return ScanSample(np.full(pairs, mark), np.full(pairs, -mark), Unmatched(1, pairs), Unmatched(2, 10), mark)
 
 
-def fed(most: int, *scans: ScanSample) -> tuple[ScanSample, int]:
+def fed(window: Window, *scans: ScanSample) -> tuple[ScanSample, int]:
     """What the last of scans, four seconds apart, comes to."""
-    window = Window(10)
-    for k, one in enumerate(scans):
-        window.add(4 * k * SECOND_NS, SETTING, one)
-    return window.gather(most, NEEDED)
+    found = [window.gather(4 * k * SECOND_NS, SETTING, one, NEEDED) for k, one in enumerate(scans)]
+    return found[-1]
 
 
 def test_a_scan_with_enough_pairs_stands_alone() -> None:
-    sample, scans = fed(5, scan(20, 1.0), scan(16, 2.0))
+    sample, scans = fed(Window(5), scan(20, 1.0), scan(16, 2.0))
     assert (sample.disparities.tolist(), scans) == ([2.0] * 16, 1)
 
 
 def test_as_many_scans_before_it_are_taken_as_it_needs() -> None:
-    sample, scans = fed(5, scan(9, 1.0), scan(6, 2.0), scan(6, 3.0), scan(6, 4.0))
+    sample, scans = fed(Window(5), scan(9, 1.0), scan(6, 2.0), scan(6, 3.0), scan(6, 4.0))
     assert (sample.disparities.tolist(), scans) == ([4.0] * 6 + [3.0] * 6 + [2.0] * 6, 3)
     assert (sample.unmatched_radar, sample.unmatched_dem, sample.level) == ((3, 18), (6, 30), 4.0)
 
 
 def test_without_enough_in_all_of_them_the_scan_stands_alone() -> None:
-    sample, scans = fed(2, scan(9, 1.0), scan(6, 2.0), scan(6, 3.0))
+    sample, scans = fed(Window(2), scan(9, 1.0), scan(6, 2.0), scan(6, 3.0))
     assert (len(sample.disparities), scans) == (6, 1)
 
 
@@ -46,19 +44,8 @@ def test_without_enough_in_all_of_them_the_scan_stands_alone() -> None:
 )
 def test_scans_that_do_not_belong_together_are_not_gathered(time_s: int, setting: tuple[float, int]) -> None:
     window = Window(5)
-    window.add(0, SETTING, scan(10, 1.0))
-    window.add(time_s * SECOND_NS, setting, scan(10, 2.0))
-    assert window.gather(5, NEEDED)[1] == 1
-    assert len(window.last(5).disparities) == 10
-
-
-def test_the_last_scans_are_given_together_whatever_they_have() -> None:
-    window = Window(3)
-    for k in range(5):
-        window.add(4 * k * SECOND_NS, SETTING, scan(20, float(k)))
-    assert window.last(2).disparities.tolist() == [4.0] * 20 + [3.0] * 20
-    assert window.last(2).azimuth_rad.tolist() == [-4.0] * 20 + [-3.0] * 20
-    assert len(window.last(9).disparities) == 60
+    window.gather(0, SETTING, scan(10, 1.0), NEEDED)
+    assert window.gather(time_s * SECOND_NS, setting, scan(10, 2.0), NEEDED)[1] == 1
 
 
 def test_the_signal_level_is_the_mean_of_what_is_lit_in_the_farther_half() -> None:
