@@ -28,6 +28,18 @@ class UnmatchedModel(BaseModel):
     overdispersion: float = Field(ge=0, le=1)
 
 
+class CommonErrors(BaseModel):
+    """Errors that the disparities of a scan have in common: of the position, and of the height.
+
+    `place_bins` is the standard deviation of a shift, north and east each, in range bins; `stretch` that of how much a
+    disparity grows with each bin of the shadow's size, since shadows seen from higher up are shorter.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    place_bins: float = Field(ge=0)
+    stretch: float = Field(ge=0)
+
+
 class LevelLimits(BaseModel):
     """Between which signal levels the fault-free scans lay."""
 
@@ -51,7 +63,7 @@ class Calibration(BaseModel):
     sigma_bins: float = Field(gt=0)
     rms_bins: float = Field(gt=0)
     variance_factor: float = Field(ge=1)
-    common_error_bins: float | None = Field(None, ge=0)
+    common: CommonErrors | None = None
     unmatched_radar: UnmatchedModel | None = None
     unmatched_dem: UnmatchedModel | None = None
     level: LevelLimits | None = None

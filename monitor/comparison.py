@@ -23,8 +23,8 @@ PAIRINGS: Final[dict[str, Callable[[Any, Any], NDArray[np.void]]]] = {"overlap":
 class Comparison:
     """Both threads of one scan on the radials in use (n,), and their pairs of shadows (N,): for pictures and exports.
 
-    Centres of shadows are in range bins; `pair_radial` is the index of a pair's radial among those in use, and
-    `pair_azimuth_rad` that radial's true azimuth.
+    Centres of shadows are in range bins; `pair_radial` is the index of a pair's radial among those in use,
+    `pair_azimuth_rad` that radial's true azimuth, and `pair_size` how many bins the pair's terrain shadow has.
     """
 
     scan_angle_deg: NDArray[np.float64]
@@ -32,6 +32,7 @@ class Comparison:
     dem_states: NDArray[np.int8]
     pair_radial: NDArray[np.int64]
     pair_azimuth_rad: NDArray[np.float64]
+    pair_size: NDArray[np.float64]
     radar_centre: NDArray[np.float64]
     dem_centre: NDArray[np.float64]
     unmatched_radar: Unmatched
@@ -44,8 +45,8 @@ class Comparison:
 
     def sample(self, scan: Scan) -> ScanSample:
         """What the tests look at, of the scan that was compared."""
-        level = signal_level(scan.bins)
-        return ScanSample(self.disparities, self.pair_azimuth_rad, self.unmatched_radar, self.unmatched_dem, level)
+        pairs = self.disparities, self.pair_azimuth_rad, self.pair_size
+        return ScanSample(*pairs, self.unmatched_radar, self.unmatched_dem, signal_level(scan.bins))
 
 
 def compare(
@@ -83,6 +84,7 @@ def compare(
         dem,
         pairs["radial"],
         scene.pointing.azimuth_rad[pairs["radial"]],
+        foreseen["size"][pairs["dem"]].astype(np.float64),
         whole["centre"][pairs["radar"]],
         foreseen["centre"][pairs["dem"]],
         Unmatched(*unmatched_share(counted[counted["size"] >= s.unmatched_size], every_predicted, dem)),

@@ -17,7 +17,7 @@ from monitor.calibration import Calibration, UnmatchedModel
 from monitor.disparity import minimum_detectable_bias, normalised, robust_statistic, robust_threshold, threshold
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
-from monitor.shift import shift_statistic, shift_threshold
+from monitor.shift import score, shift_statistic, shift_threshold
 
 LEAST_RHO = 1e-6  # which is a binomial
 MOST_PAIRS = 1000  # beyond, no further ones would make Q see
@@ -112,7 +112,7 @@ def _shares(settings: MonitorSettings, calibration: Calibration) -> tuple[float,
     they need.
     """
     s, c = settings, calibration
-    budgets = ((s.shift_budget, c.common_error_bins), (s.unmatched_radar_budget, c.unmatched_radar),
+    budgets = ((s.shift_budget, c.common), (s.unmatched_radar_budget, c.unmatched_radar),
                (s.unmatched_dem_budget, c.unmatched_dem))  # fmt: skip
     shift, radar, dem = (0.0 if s.method == "paper" or known is None else budget for budget, known in budgets)
     return s.p_fa * (1 - shift - radar - dem), s.p_fa * shift, s.p_fa * radar, s.p_fa * dem
@@ -137,11 +137,9 @@ def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> fl
 
 
 def _shift(sample: ScanSample, c: Calibration, p_fa: float) -> Test | None:
-    if c.common_error_bins is None or not p_fa:
+    if c.common is None or not p_fa:
         return None
-    found = shift_statistic(
-        sample.disparities, sample.azimuth_rad, c.median_bins, c.clip_bins, c.sigma_bins, c.common_error_bins
-    )
+    found = shift_statistic(score(sample, c.median_bins, c.clip_bins), c.sigma_bins, c.common)
     return Test("the shift statistic", found, shift_threshold(p_fa))
 
 

@@ -3,7 +3,7 @@
 The fit follows from the heavy tails of real terrain: the median m, a robust spread r (normalised median absolute
 deviation), the clip at +-k r, the root mean square sigma of what the clip leaves, and the variance factor
 c = E[(Q - N)^2] / E[2 N], which is 1 for independent normal disparities and grows with errors common to a scan. What
-of those is an error of the position is measured apart, for the test for a shift.
+of those comes of a wrong position or height is measured apart, for the test for a shift.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from monitor.decision import examine
 from monitor.disparity import clipped, robust_statistic
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
-from monitor.shift import common_error
+from monitor.shift import common_errors, score
 
 QUARTILE = float(ndtri(0.75))  # of a normal distribution: half of it lies nearer to its median
 LEVELS_LEFT_OUT = 0.5  # percent of the scans at either end
@@ -65,7 +65,7 @@ def fit(
         sigma_bins=sigma,
         rms_bins=float(np.sqrt(np.mean(pooled**2))),
         variance_factor=max(1.0, float(np.mean((q - n) ** 2) / np.mean(2 * n))),
-        common_error_bins=common_error([(s.disparities, s.azimuth_rad) for s in usable], median, clip, sigma),
+        common=common_errors([score(scan, median, clip) for scan in usable], sigma),
         unmatched_radar=_shares([scan.unmatched_radar for scan in usable]),
         unmatched_dem=_shares([scan.unmatched_dem for scan in usable]),
         level=_levels(np.array([scan.level for scan in usable])),

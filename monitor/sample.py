@@ -20,18 +20,19 @@ class Unmatched(NamedTuple):
 
 
 class ScanSample(NamedTuple):
-    """Disparities (N,) of eq. (6) in range bins and the true azimuths (N,) of their radials; the unmatched shadows of
-    either thread, and the signal level.
+    """Disparities (N,) of eq. (6) in range bins, the true azimuths (N,) of their radials and the sizes (N,) of their
+    terrain shadows in range bins; the unmatched shadows of either thread, and the signal level.
     """
 
     disparities: NDArray[np.float64]
     azimuth_rad: NDArray[np.float64]
+    size: NDArray[np.float64]
     unmatched_radar: Unmatched
     unmatched_dem: Unmatched
     level: float  # of `signal_level`, NaN where nothing is lit
 
 
-NOTHING = ScanSample(np.empty(0), np.empty(0), Unmatched(0, 0), Unmatched(0, 0), float("nan"))
+NOTHING = ScanSample(np.empty(0), np.empty(0), np.empty(0), Unmatched(0, 0), Unmatched(0, 0), float("nan"))
 
 
 def together(samples: Sequence[ScanSample]) -> ScanSample:
@@ -39,6 +40,7 @@ def together(samples: Sequence[ScanSample]) -> ScanSample:
     return ScanSample(
         np.concatenate([sample.disparities for sample in samples]),
         np.concatenate([sample.azimuth_rad for sample in samples]),
+        np.concatenate([sample.size for sample in samples]),
         _sum([sample.unmatched_radar for sample in samples]),
         _sum([sample.unmatched_dem for sample in samples]),
         samples[0].level,

@@ -15,7 +15,7 @@ from monitor.disparity import robust_statistic
 from monitor.fitting import fit
 from monitor.sample import ScanSample
 from monitor.settings import MonitorSettings
-from monitor.shift import shift_statistic, shift_threshold
+from monitor.shift import score, shift_statistic, shift_threshold
 
 P_FAS = (1e-1, 1e-2, 1e-3)
 MINIMUM_PAIRS = 16
@@ -64,15 +64,15 @@ class Shift:
     """The shift statistic with the whole probability of a false alert."""
 
     def __init__(self, calibration: Calibration) -> None:
-        if calibration.common_error_bins is None:
-            raise ValueError(f"calibration {calibration.name} has no common error: fit one")
-        self._calibration, self._common = calibration, calibration.common_error_bins
+        if calibration.common is None:
+            raise ValueError(f"calibration {calibration.name} has no common errors: fit them")
+        self._calibration, self._common = calibration, calibration.common
 
     def __call__(self, scan: ScanSample, p_fa: float) -> bool:
         """Whether it exceeds its threshold."""
-        c, common = self._calibration, self._common
-        d, azimuth = scan.disparities, scan.azimuth_rad
-        return shift_statistic(d, azimuth, c.median_bins, c.clip_bins, c.sigma_bins, common) > shift_threshold(p_fa)
+        c = self._calibration
+        found = score(scan, c.median_bins, c.clip_bins)
+        return shift_statistic(found, c.sigma_bins, self._common) > shift_threshold(p_fa)
 
 
 class Unmatched:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import betabinom, binom, chi2
 
-from monitor.calibration import Calibration, UnmatchedModel
+from monitor.calibration import Calibration, CommonErrors, UnmatchedModel
 from monitor.decision import DEM_SHARE, RADAR_SHARE, examine, pairs_for_verdict, unmatched_threshold
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
@@ -18,16 +18,16 @@ CALIBRATION = Calibration(
     sigma_bins=2.0,
     rms_bins=4.0,
     variance_factor=1.0,
-    common_error_bins=0.5,
+    common=CommonErrors(place_bins=0.5, stretch=0.0),
     unmatched_radar=MODEL,
     unmatched_dem=MODEL,
 )
-BARE = CALIBRATION.model_copy(update={"common_error_bins": None, "unmatched_radar": None, "unmatched_dem": None})
+BARE = CALIBRATION.model_copy(update={"common": None, "unmatched_radar": None, "unmatched_dem": None})
 FEW, MANY = Unmatched(10, 50), Unmatched(45, 50)
 
 
 def sample(n: int = 40, d: float = 1.0, radar: Unmatched = FEW, dem: Unmatched = FEW) -> ScanSample:
-    return ScanSample(np.full(n, d), np.linspace(-np.pi, np.pi, n), radar, dem, 2.0)
+    return ScanSample(np.full(n, d), np.linspace(-np.pi, np.pi, n), np.full(n, 9.0), radar, dem, 2.0)
 
 
 @pytest.mark.parametrize("eligible", [2, 3, 5, 8, 20, 60, 200])

@@ -12,7 +12,9 @@ SETTING = (10.0, 512)
 
 
 def scan(pairs: int, mark: float) -> ScanSample:
-    return ScanSample(np.full(pairs, mark), np.full(pairs, -mark), Unmatched(1, pairs), Unmatched(2, 10), mark)
+    return ScanSample(
+        np.full(pairs, mark), np.full(pairs, -mark), np.full(pairs, 9.0), Unmatched(1, pairs), Unmatched(2, 10), mark
+    )
 
 
 def fed(window: Window, *scans: ScanSample) -> tuple[ScanSample, int]:
