@@ -295,7 +295,7 @@ HEADINGS = (
     "threshold (no unit)",
     "mean (bins)",
     "S (no unit)",
-    "its limit",
+    "limit of S (no unit)",
     "unmatched, radar (%)",
     "unmatched, terrain (%)",
     "reasons",

@@ -57,6 +57,16 @@ def test_a_calibration_for_another_radar_or_range_is_refused(white_mountains: Te
     assert "test radar is for a range of 10 NM, the radar is set to 20 NM" in refused(white_mountains, farther)
 
 
+def test_a_calibration_for_another_profile_of_as_many_bins_is_refused(white_mountains: Terrain, honest: Scan) -> None:
+    """One whose levels are coded otherwise casts other shadows."""
+    for_another = CALIBRATED.model_copy(update={"radar_profile": "rdr4000"})
+    read = replace(honest, profile="arinc708")
+    verdict, comparison = Monitor(white_mountains, None, for_another).judge(read, flying())
+    assert (verdict.verdict, comparison) == ("unavailable", None)
+    assert verdict.reasons[0].startswith("calibration test radar is for radar profile rdr4000, this one is arinc708: ")
+    assert judge(white_mountains, read, calibration=for_another.model_copy(update={"radar_profile": "arinc708"}))
+
+
 @pytest.mark.parametrize("name", [quantity.name for quantity in NEEDED])
 def test_a_missing_quantity_is_named(white_mountains: Terrain, honest: Scan, name: str) -> None:
     aircraft = flying()

@@ -59,6 +59,15 @@ def sectors(scans: Sequence[Scan]) -> list[tuple[float, float]]:
     return [scan.sector_deg for scan in scans]
 
 
+def test_a_scan_tells_by_which_profile_its_words_were_read() -> None:
+    builder = ScanBuilder()
+    times = np.arange(20) * 20_000_000
+    found = [*builder.feed(times, radials(np.arange(-10.0, 10.0)), "one")]
+    found += [*builder.feed(times + 400_000_000, radials(np.arange(9.0, -11.0, -1.0), tilt_deg=3.0), "other")]
+    found += [*builder.finish()]
+    assert [scan.profile for scan in found] == ["one", "other"]
+
+
 def test_a_one_directional_radar_gives_a_scan_for_each_fly_back() -> None:
     sweep = list(range(-90, 91, 3))
     scans = Sweeps().feed(radials(sweep * 3)).finish()
