@@ -62,8 +62,8 @@ def sectors(scans: Sequence[Scan]) -> list[tuple[float, float]]:
 def test_a_scan_tells_by_which_profile_its_words_were_read() -> None:
     builder = ScanBuilder()
     times = np.arange(20) * 20_000_000
-    found = [*builder.feed(times, radials(np.arange(-10.0, 10.0)), "one")]
-    found += [*builder.feed(times + 400_000_000, radials(np.arange(9.0, -11.0, -1.0), tilt_deg=3.0), "other")]
+    found = [*builder.feed(times, radials([*range(-10, 10)]), "one")]
+    found += [*builder.feed(times + 400_000_000, radials([*range(9, -11, -1)], tilt_deg=3.0), "other")]
     found += [*builder.finish()]
     assert [scan.profile for scan in found] == ["one", "other"]
 
