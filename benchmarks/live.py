@@ -1,7 +1,8 @@
 """From a radial that came in to the verdicts that it updates, time of computing. `make live`. Exits 1 beyond the limit.
 
 A rack as live as a recording can be: every chunk of 10 ms of a radar of 80 words/s, an IRU, a GNSS receiver and a radio
-altimeter, with every label at its shortest interval, is handed over by itself, and its events are written as JSON. What
+altimeter, with every label at its shortest interval, is handed over by itself, and its events are written as JSON. The
+limit holds for 99 of 100 chunks; those that close a scan, fewer than one in a hundred, are printed by themselves. What
 counts is the time that the thread had a processor for, so that other programs do not; the clock's is printed too.
 """
 
@@ -49,11 +50,13 @@ def main() -> None:
     failures: list[str] = []
     core = Core(lambda before: Pipeline(config, monitor, before=before), take, failures.append)
     computed_ms, waited_ms, closes = _handed_over(core, records, judged)
+    if failures or not closes.any():
+        raise SystemExit(f"no scan was judged: {failures}")
     _print("chunks", computed_ms, waited_ms)
     _print("of these, chunks that close a scan", computed_ms[closes], waited_ms[closes])
     p99 = float(np.percentile(computed_ms, 99))
     print(f"99 % of the chunks within {p99:.2f} ms of computing, {p99 / LIMIT_MS:.2f} of the limit of {LIMIT_MS:g} ms")
-    if failures or not closes.any() or p99 > LIMIT_MS:
+    if p99 > LIMIT_MS:
         raise SystemExit(1)
 
 

@@ -33,7 +33,9 @@ def describe(event: Event) -> str:
         reasons = "; ".join(event.reasons)
         if event.q is None or event.threshold is None or event.t_bins2 is None:
             return f"scan {event.scan}: {event.verdict.upper()}  {reasons}"
-        figures = f"N {event.n_pairs}  T {event.t_bins2:.1f} bins2  Q {event.q:.1f} against {event.threshold:.1f}"
+        robust = event.method == "robust"
+        decides = f"Q {event.q:.1f}" if robust else f"N T / sigma^2 {event.t_normalised:.1f}"
+        figures = f"N {event.n_pairs}  T {event.t_bins2:.1f} bins2  {decides} against {event.threshold:.1f}"
         if event.shift is not None and event.shift_limit is not None:
             figures += f"  S {event.shift:.1f} against {event.shift_limit:.1f}"
         return f"scan {event.scan}: {event.verdict.upper()}  {figures}  {reasons}"

@@ -69,6 +69,8 @@ class Pipeline:
         self._doubted: set[str] = set()  # quantities whose words seem to be read in a wrong way, told already
         self._owned_up: set[str] = set()  # and those that a verdict has named
         self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
+        if monitor and not before:
+            self._troubles |= {text: text for text in monitor.untested}
         if before:
             self._counters = before._counters
             self._scans.number = before._scans.number

@@ -128,12 +128,12 @@ paired with the one that the stored terrain predicts there; N<sub>D</sub> is the
 disparity D of a pair is the difference of the two centres, radar minus terrain, in range bins. T is the mean of
 D<sup>2</sup>, as published. Q is the sum of the squares of D, each taken about its calibrated median and clipped,
 over the calibrated variance; it has no unit. The threshold is what the statistic of the method (Q for robust,
-N<sub>D</sub> T / sigma<sup>2</sup> for paper) exceeds with probability P<sub>FA</sub> in a scan in which nothing is
-wrong: above it the verdict is <i>alert</i>. The mean is that of D: a terrain that lies too near or too far on all
-radials moves it, a sideways shift need not. S is the shift statistic: whether the disparities follow the cosine of
-the azimuth, as over terrain that is stored some way off. Unmatched is the share of shadows that have no partner in
-the other thread: of the radar's, and of the terrain's. With a calibration S and the terrain's share alert too, above
-limits of their own. <i>Unavailable</i> means that nothing
+N<sub>D</sub> T / sigma<sup>2</sup> for paper) exceeds with its part of the probability P<sub>FA</sub> in a scan in
+which nothing is wrong: above it the verdict is <i>alert</i>. The mean is that of D: a terrain that lies too near or
+too far on all radials moves it, a sideways shift need not. S is the shift statistic: whether the disparities follow
+the cosine of the azimuth, as over terrain that is stored some way off. Unmatched is the share of shadows that have no
+partner in the other thread: of the radar's, and of the terrain's. With the robust method and a calibration S and the
+terrain's share, and by option the radar's, alert too, above limits of their own. <i>Unavailable</i> means that nothing
 can be said, for the reason given; it is neither ok nor alert.</p>"""
 
 
@@ -267,7 +267,9 @@ def _largest(v: Verdict, method: str) -> float:
         (v.unmatched_radar, v.unmatched_radar_limit),
         (v.unmatched_dem, v.unmatched_dem_limit),
     )
-    return max((value / limit for value, limit in tests if value is not None and limit), default=0.0)
+    return max(
+        (value / max(limit, 1e-3) for value, limit in tests if value is not None and limit is not None), default=0.0
+    )
 
 
 def _histogram(legs: Sequence[Flown]) -> Figure:

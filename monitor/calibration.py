@@ -20,12 +20,14 @@ class CheckedRate(BaseModel):
 class UnmatchedModel(BaseModel):
     """How large a share of one thread's eligible shadows has no partner when nothing is wrong.
 
-    `overdispersion` is rho of the variance m (1 - m) (1 / n + rho): 0 for shadows that stand or fall each by itself.
+    Of shadows of `least_size` range bins and more. `overdispersion` is rho of the variance m (1 - m) (1 / n + rho): 0
+    for shadows that stand or fall each by itself.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     mean: float = Field(gt=0, lt=1)
     overdispersion: float = Field(ge=0, le=1)
+    least_size: int = Field(3, ge=1)  # of the files that do not say
 
 
 class CommonErrors(BaseModel):
@@ -123,4 +125,5 @@ def load_calibration(path: Path) -> Calibration:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "the file"
-        raise ValueError(f"calibration file {path}: {place}: {first['msg']}") from error
+        mend = "if another version made it, make it anew with shadebus calibrate radar"
+        raise ValueError(f"calibration file {path}: {place}: {first['msg']}; {mend}") from error

@@ -9,8 +9,10 @@ distribution with the mean m that calibration found, and of the share the varian
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import betaln
 
 from monitor.calibration import Calibration, UnmatchedModel
@@ -35,7 +37,7 @@ class Test:
     @property
     def exceeded(self) -> bool:
         """Whether something is wrong."""
-        return self.value > self.limit
+        return not self.value <= self.limit  # of what is no number, too
 
     def __str__(self) -> str:
         return f"{self.name} {self.value:.4g} exceeds {self.limit:.4g}"
@@ -45,7 +47,7 @@ class Test:
 class Findings:
     """The tests that a sample allows, and the numbers behind them.
 
-    Without the statistic `blind` says why, and no sample is ok; what the numbers of the published test are is told with
+    Without the statistic `blind` says why, and no sample is ok; with it the numbers of the published test are told with
     either method.
     """
 
@@ -68,36 +70,42 @@ class Findings:
         ]
 
 
-def examine(sample: ScanSample, settings: MonitorSettings, calibration: Calibration) -> Findings:
-    """Put a sample to every test that it and the calibration allow."""
-    d, c = sample.disparities, calibration
-    p_fa, p_fa_shift, p_fa_radar, p_fa_dem = _shares(settings, calibration)
-    radar = _unmatched(RADAR_SHARE, sample.unmatched_radar, c.unmatched_radar, p_fa_radar)
-    dem = _unmatched(DEM_SHARE, sample.unmatched_dem, c.unmatched_dem, p_fa_dem)
+def examine(
+    sample: ScanSample, settings: MonitorSettings, calibration: Calibration, gathered: NDArray[np.float64] | None = None
+) -> Findings:
+    """Put a scan to every test that it and the calibration allow.
+
+    `gathered` are disparities (N,) of this scan and those before it, at which the statistic looks instead.
+    """
+    c, p_fa = calibration, _shares(settings, calibration)
+    d = sample.disparities if gathered is None else gathered
+    radar = unmatched_test(RADAR_SHARE, sample.unmatched_radar, c.unmatched_radar, p_fa.radar)
+    dem = unmatched_test(DEM_SHARE, sample.unmatched_dem, c.unmatched_dem, p_fa.dem)
+    shift = shift_test(sample, c, p_fa.shift) if len(sample.disparities) >= settings.pairs_needed else None
     if len(d) < settings.pairs_needed:
         return Findings(None, f"{len(d)} pairs of shadows, {settings.pairs_needed} needed", None, radar, dem)
-    shift = _shift(sample, c, p_fa_shift)
     q = robust_statistic(d, c.median_bins, c.clip_bins, c.sigma_bins)
     t = normalised(d, c.rms_bins)
     if settings.method == "robust":
-        test = Test("Q", q, robust_threshold(len(d), p_fa, c.variance_factor))
+        test = Test("Q", q, robust_threshold(len(d), p_fa.statistic, c.variance_factor))
         most = _most(len(d), c)
-        if most <= test.limit:
+        if most <= test.limit and shift is None:
             blind = f"Q reaches {most:.1f} at most, its threshold is {test.limit:.1f}"
-            return Findings(None, f"{len(d)} pairs cannot alert at P_FA {p_fa:g}: {blind}", shift, radar, dem)
+            return Findings(None, f"{len(d)} pairs cannot alert at P_FA {settings.p_fa:g}: {blind}", None, radar, dem)
     else:
-        test = Test("N T / sigma^2", t, threshold(len(d), p_fa))
-    return Findings(test, "", shift, radar, dem, t, q, minimum_detectable_bias(len(d), c.rms_bins, p_fa, settings.p_md))
+        test = Test("N T / sigma^2", t, threshold(len(d), p_fa.statistic))
+    mdb_bins = minimum_detectable_bias(len(d), c.rms_bins, settings.p_fa, settings.p_md)
+    return Findings(test, "", shift, radar, dem, t, q, mdb_bins)
 
 
 def pairs_for_verdict(settings: MonitorSettings, calibration: Calibration) -> int:
     """The least number of pairs with which the statistic can exceed its threshold."""
-    p_fa, least = _shares(settings, calibration)[0], settings.pairs_needed
+    p_fa, least = _shares(settings, calibration).statistic, settings.pairs_needed
     if settings.method == "paper":
         return least
     factor = calibration.variance_factor
     enough = (n for n in range(least, MOST_PAIRS) if _most(n, calibration) > robust_threshold(n, p_fa, factor))
-    return next(enough, MOST_PAIRS)
+    return next(enough, max(least, MOST_PAIRS))
 
 
 def _most(pairs: int, calibration: Calibration) -> float:
@@ -105,17 +113,44 @@ def _most(pairs: int, calibration: Calibration) -> float:
     return pairs * (calibration.clip_bins / calibration.sigma_bins) ** 2
 
 
-def _shares(settings: MonitorSettings, calibration: Calibration) -> tuple[float, float, float, float]:
-    """The P_FA of the statistic, of the shift statistic, and of either thread's unmatched share.
+class _Shares(NamedTuple):
+    """The P_FA of each test."""
 
-    The statistic has what the others leave; the published test knows no others, nor does a calibration that lacks what
-    they need.
+    statistic: float
+    shift: float
+    radar: float
+    dem: float
+
+
+def _shares(settings: MonitorSettings, calibration: Calibration) -> _Shares:
+    """The statistic has what the others leave: all of it by the published test, which knows no others.
+
+    A test for which the calibration lacks what it needs has nothing.
     """
     s, c = settings, calibration
-    budgets = ((s.shift_budget, c.common), (s.unmatched_radar_budget, c.unmatched_radar),
-               (s.unmatched_dem_budget, c.unmatched_dem))  # fmt: skip
-    shift, radar, dem = (0.0 if s.method == "paper" or known is None else budget for budget, known in budgets)
-    return s.p_fa * (1 - shift - radar - dem), s.p_fa * shift, s.p_fa * radar, s.p_fa * dem
+    if s.method == "paper":
+        return _Shares(s.p_fa, 0.0, 0.0, 0.0)
+    shift = 0.0 if c.common is None else s.shift_budget
+    radar, dem = (
+        0.0 if model is None or model.least_size != s.unmatched_size else budget
+        for model, budget in ((c.unmatched_radar, s.unmatched_radar_budget), (c.unmatched_dem, s.unmatched_dem_budget))
+    )
+    return _Shares(s.p_fa * (1 - shift - radar - dem), s.p_fa * shift, s.p_fa * radar, s.p_fa * dem)
+
+
+def untested(settings: MonitorSettings, calibration: Calibration) -> list[str]:
+    """What a calibration does not allow to be tested although the settings would have it, and why."""
+    if settings.method == "paper":
+        return []
+    name, found = calibration.name, []
+    if calibration.common is None and settings.shift_budget:
+        found.append(f"shifts are not tested: calibration {name} has no errors in common, make it anew")
+    model = calibration.unmatched_dem
+    if settings.unmatched_dem_budget and (model is None or model.least_size != settings.unmatched_size):
+        has = f"those of {model.least_size} bins and more" if model else "none"
+        wanted = f"of {settings.unmatched_size} bins and more"
+        found.append(f"unmatched terrain shadows {wanted} are not tested: calibration {name} has {has}, make it anew")
+    return found
 
 
 def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> float:
@@ -136,14 +171,16 @@ def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> fl
     return float(np.argmax(more <= p_fa) / eligible)
 
 
-def _shift(sample: ScanSample, c: Calibration, p_fa: float) -> Test | None:
+def shift_test(sample: ScanSample, c: Calibration, p_fa: float) -> Test | None:
+    """Whether the disparities of a scan follow a shift; None without a share, or what a calibration needs for it."""
     if c.common is None or not p_fa:
         return None
     found = shift_statistic(score(sample, c.median_bins, c.clip_bins), c.sigma_bins, c.common)
     return Test("the shift statistic", found, shift_threshold(p_fa))
 
 
-def _unmatched(name: str, found: Unmatched, model: UnmatchedModel | None, p_fa: float) -> Test | None:
+def unmatched_test(name: str, found: Unmatched, model: UnmatchedModel | None, p_fa: float) -> Test | None:
+    """Whether more shadows are unmatched than when nothing is wrong; None without a share, a model or any shadow."""
     if model is None or not p_fa or found.share is None:
         return None
     return Test(name, found.share, unmatched_threshold(found.eligible, model, p_fa))

@@ -66,8 +66,8 @@ def fit(
         rms_bins=float(np.sqrt(np.mean(pooled**2))),
         variance_factor=max(1.0, float(np.mean((q - n) ** 2) / np.mean(2 * n))),
         common=common_errors([score(scan, median, clip) for scan in usable], sigma),
-        unmatched_radar=_shares([scan.unmatched_radar for scan in usable]),
-        unmatched_dem=_shares([scan.unmatched_dem for scan in usable]),
+        unmatched_radar=_shares([scan.unmatched_radar for scan in usable], settings),
+        unmatched_dem=_shares([scan.unmatched_dem for scan in usable], settings),
         level=_levels(np.array([scan.level for scan in usable])),
     )
     held_out = [scan for scan in check if len(scan.disparities) >= minimum_pairs]
@@ -80,7 +80,7 @@ def _checked(scans: Sequence[ScanSample], made: Calibration, settings: MonitorSe
     return CheckedRate(p_fa=p_fa, scans=len(scans), alerts=alerts)
 
 
-def _shares(found: Sequence[Unmatched]) -> UnmatchedModel | None:
+def _shares(found: Sequence[Unmatched], settings: MonitorSettings) -> UnmatchedModel | None:
     """The mean share over scans, and by how much its variance exceeds a binomial's."""
     eligible = np.array([one.eligible for one in found])
     share = np.array([one.alone for one in found])[eligible > 0] / eligible[eligible > 0]
@@ -88,7 +88,8 @@ def _shares(found: Sequence[Unmatched]) -> UnmatchedModel | None:
         return None
     mean = float(share.mean())
     excess = (share - mean) ** 2 / (mean * (1 - mean)) - 1 / eligible[eligible > 0]
-    return UnmatchedModel(mean=mean, overdispersion=float(np.clip(excess.mean(), 0, 1)))
+    rho = float(np.clip(excess.mean(), 0, 1))
+    return UnmatchedModel(mean=mean, overdispersion=rho, least_size=settings.unmatched_size)
 
 
 def _levels(levels: NDArray[np.float64]) -> LevelLimits | None:

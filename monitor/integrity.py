@@ -14,7 +14,7 @@ from monitor.aircraft import Aircraft
 from monitor.calibration import NO_CALIBRATION, Calibration, uncalibrated
 from monitor.comparison import Comparison, compare, thin
 from monitor.coverage import uncovered
-from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, Test, examine, pairs_for_verdict
+from monitor.decision import DEM_SHARE, RADAR_SHARE, Findings, Test, examine, pairs_for_verdict, untested
 from monitor.disparity import statistic, threshold
 from monitor.geodesy import LONGEST_RANGE_NM, NM_M
 from monitor.hysteresis import Hysteresis
@@ -140,7 +140,7 @@ class Monitor:
 
     def unavailable(self, scan: int, reasons: list[str]) -> Verdict:
         """The verdict that nothing can be said about a scan that could not be compared."""
-        return self._told(scan, UNAVAILABLE, reasons, NOTHING, Findings(), 0)
+        return self._told(scan, UNAVAILABLE, reasons, NOTHING, NOTHING.disparities, Findings(), 0)
 
     def _decide(
         self, scan: Scan, comparison: Comparison, doubts: list[str], reasons: list[str]
@@ -149,32 +149,40 @@ class Monitor:
         bins = scan.bins.shape[1]
         now_ns, setting = int(scan.time_ns[-1]), (scan.range_nm, bins)
         calibration = self.calibration or uncalibrated(bins)
-        sample, scans = comparison.sample(scan), 1
+        sample = comparison.sample(scan)
+        pairs, scans = sample.disparities, 1
         unlike = self._unlike_calibration(sample)
         if unlike or doubts:  # which no scan to come may inherit
             self._window = Window(self.settings.window_scans)
         else:
             needed = pairs_for_verdict(self.settings, calibration)
-            sample, scans = self._window.gather(now_ns, setting, sample, needed)
-        findings = examine(sample, self.settings, calibration)
+            pairs, scans = self._window.gather(now_ns, setting, pairs, needed)
+        findings = examine(sample, self.settings, calibration, pairs)
         if findings.alerts:
             verdict, first = UNAVAILABLE if unlike else ALERT, [str(test) for test in findings.alerts]
         elif findings.statistic is None:
             verdict, first = UNAVAILABLE, [findings.blind]
         else:
-            first = self._contradictions(sample, findings)
+            first = self._contradictions(sample, pairs, findings)
             verdict = UNAVAILABLE if first or doubts or unlike else OK
         gathered = [f"pairs of the last {scans} scans together"] if scans > 1 else []
         because = [*unlike, *first, *doubts, *gathered, *reasons]
-        told = self._told(scan.number, verdict, because, sample, findings, scans)
+        told = self._told(scan.number, verdict, because, sample, pairs, findings, scans)
         return told, verdict == told.verdict == ALERT and scans == 1
 
     def _told(
-        self, scan: int, verdict: str, reasons: list[str], sample: ScanSample, findings: Findings, scans: int
+        self,
+        scan: int,
+        verdict: str,
+        reasons: list[str],
+        sample: ScanSample,
+        d: NDArray[np.float64],
+        findings: Findings,
+        scans: int,
     ) -> Verdict:
         """A verdict with every number that there is, once it has settled."""
         settled, why = self._hysteresis.settle(verdict)
-        d, shift, radar, dem = sample.disparities, findings.shift, findings.unmatched_radar, findings.unmatched_dem
+        shift, radar, dem = findings.shift, findings.unmatched_radar, findings.unmatched_dem
         n, test = len(d), findings.statistic
         return Verdict(
             scan=scan,
@@ -208,12 +216,12 @@ class Monitor:
         levels = f"{c.level.lowest:.2f} to {c.level.highest:.2f}"
         return [f"{found} in the farther half, where calibration {c.name} has {levels}: check the radar's gain"]
 
-    def _contradictions(self, sample: ScanSample, findings: Findings) -> list[str]:
+    def _contradictions(self, sample: ScanSample, pairs: NDArray[np.float64], findings: Findings) -> list[str]:
         """What forbids an ok that rests on stated defaults: they may be too wide for this radar, and hide an error."""
         if self.calibration:
             return []
         measures = (
-            Test("N T / sigma^2", findings.t_normalised or 0.0, threshold(len(sample.disparities), self.settings.p_fa)),
+            Test("N T / sigma^2", findings.t_normalised or 0.0, threshold(len(pairs), self.settings.p_fa)),
             Test(RADAR_SHARE, sample.unmatched_radar.share or 0.0, MOST_UNMATCHED),
             Test(DEM_SHARE, sample.unmatched_dem.share or 0.0, MOST_UNMATCHED),
         )
@@ -221,6 +229,11 @@ class Monitor:
 
     def _caveats(self) -> list[str]:
         return ["no calibration loaded: stated defaults in use"] if self.calibration is None else []
+
+    @property
+    def untested(self) -> list[str]:
+        """What the calibration does not allow to be tested although the settings would have it, and why."""
+        return untested(self.settings, self.calibration) if self.calibration else []
 
 
 def _buried(ground_m: NDArray[np.float64], pointing: Pointing) -> list[str]:

@@ -1,6 +1,5 @@
-"""What the tests of the monitor look at, of one scan or of several together."""
+"""What the tests of the monitor look at, of one scan."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,18 +34,6 @@ class ScanSample(NamedTuple):
 NOTHING = ScanSample(np.empty(0), np.empty(0), np.empty(0), Unmatched(0, 0), Unmatched(0, 0), float("nan"))
 
 
-def together(samples: Sequence[ScanSample]) -> ScanSample:
-    """Several scans, at least one, as if they were one; the signal level is that of the first."""
-    return ScanSample(
-        np.concatenate([sample.disparities for sample in samples]),
-        np.concatenate([sample.azimuth_rad for sample in samples]),
-        np.concatenate([sample.size for sample in samples]),
-        _sum([sample.unmatched_radar for sample in samples]),
-        _sum([sample.unmatched_dem for sample in samples]),
-        samples[0].level,
-    )
-
-
 def signal_level(bins: NDArray[np.uint8]) -> float:
     """The mean level of what is lit in the farther half of the range bins (n, M); NaN where nothing is.
 
@@ -55,7 +42,3 @@ def signal_level(bins: NDArray[np.uint8]) -> float:
     far = bins[:, bins.shape[1] // 2 :]
     lit = np.count_nonzero(far)
     return float(far.sum(dtype=np.int64) / lit) if lit else float("nan")
-
-
-def _sum(parts: Sequence[Unmatched]) -> Unmatched:
-    return Unmatched(sum(part[0] for part in parts), sum(part[1] for part in parts))

@@ -50,7 +50,7 @@ class MonitorSettings(BaseModel):
         None,
         ge=2,
         le=65_536,
-        description="pairs below which T is unavailable; 16 if not set, 20 for p_fa of 1e-4 and below",
+        description="pairs below which Q and T are unavailable; 16 if not set, 20 for p_fa of 1e-4 and below",
     )
     beam_width_deg: float = Field(3.5, gt=0.1, le=30, description="one-way 3 dB width of the antenna beam")
     azimuth_fan: int = Field(7, ge=1, le=99, description="sub-azimuths across the beam; 1 is the paper's form")
@@ -59,7 +59,9 @@ class MonitorSettings(BaseModel):
         4 / 3, ge=0.5, description="effective Earth radius factor; inf for the paper's flat Earth"
     )
     range_reference: Literal["centre", "far_edge"] = Field("centre", description="where in its bin a range is taken")
-    radial_spacing_deg: float = Field(3.0, ge=0.01, le=30, description="one radial in every so many degrees enters T")
+    radial_spacing_deg: float = Field(
+        3.0, ge=0.01, le=30, description="one radial in every so many degrees is compared"
+    )
     minimum_size: int = Field(3, ge=1, le=65_536, description="smallest shadow used, range bins")
     maximum_size: int | None = Field(None, ge=1, le=65_536, description="largest shadow used, range bins")
     unmatched_size: int = Field(
@@ -107,6 +109,8 @@ class MonitorSettings(BaseModel):
     def _some_shadow_has_a_size(self) -> Self:
         if self.maximum_size is not None and self.maximum_size < self.minimum_size:
             raise ValueError(f"maximum_size {self.maximum_size} is below minimum_size {self.minimum_size}")
+        if self.maximum_size is not None and self.maximum_size < self.unmatched_size:
+            raise ValueError(f"maximum_size {self.maximum_size} is below unmatched_size {self.unmatched_size}")
         return self
 
     @model_validator(mode="after")

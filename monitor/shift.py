@@ -10,8 +10,8 @@ and east. When nothing is wrong its covariance is
     V = sigma^2 M + s^2 M^2 + t^2 u u'    with    M = sum(a a'),  u = sum(w a):
 
 the scatter of each pair, an error s of the position that all pairs of a scan have in common, and one of the height,
-which makes all shadows longer or shorter by a share t of their sizes w. S = g' V^-1 g is then chi-square with two
-degrees of freedom.
+which makes all shadows longer or shorter, and so moves all centres by a share t of their sizes w. S = g' V^-1 g is then
+chi-square with two degrees of freedom.
 """
 
 import math

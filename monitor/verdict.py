@@ -11,7 +11,8 @@ class Verdict:
 
     `scans` is how many scans the pairs are from. `threshold` is that of the method's statistic, Q or N T / sigma^2.
     `mdb_bins` is the minimum detectable bias of the published test, with the plain rms of the calibration. `shift`, its
-    limit and those of the unmatched shares are there with a calibration that has what they need. `offset_...` is
+    limit and those of the unmatched shares are there by the robust method, with a calibration that has what they need
+    and a budget. `offset_...` is
     `offset.Offset`, of an alert.
     """
 

@@ -3,7 +3,8 @@
 from collections import deque
 from typing import NamedTuple
 
-from monitor.sample import ScanSample, together
+import numpy as np
+from numpy.typing import NDArray
 
 LONGEST_NS = 120_000_000_000  # what was seen longer ago lies behind the aircraft
 
@@ -11,7 +12,7 @@ LONGEST_NS = 120_000_000_000  # what was seen longer ago lies behind the aircraf
 class _Kept(NamedTuple):
     time_ns: int
     setting: tuple[float, int]  # range and number of bins, without which disparities in bins cannot be compared
-    sample: ScanSample
+    disparities: NDArray[np.float64]
 
 
 class Window:
@@ -21,20 +22,22 @@ class Window:
         self._kept: deque[_Kept] = deque(maxlen=scans)
 
     def gather(
-        self, time_ns: int, setting: tuple[float, int], sample: ScanSample, needed: int
-    ) -> tuple[ScanSample, int]:
-        """The newest scan, with as many before it as it takes to have the needed pairs; and how many scans these are.
+        self, time_ns: int, setting: tuple[float, int], disparities: NDArray[np.float64], needed: int
+    ) -> tuple[NDArray[np.float64], int]:
+        """The disparities of the newest scan, with as many scans before it as it takes to have the needed pairs.
+
+        And how many scans these are.
 
         A scan of another range setting, an older one than two minutes, or one from the future ends the row.
         """
-        self._kept.appendleft(_Kept(time_ns, setting, sample))
-        chosen: list[ScanSample] = []
+        self._kept.appendleft(_Kept(time_ns, setting, disparities))
+        chosen: list[NDArray[np.float64]] = []
         pairs = 0
         for kept in self._kept:
             if kept.setting != setting or not 0 <= time_ns - kept.time_ns <= LONGEST_NS:
                 break
-            chosen.append(kept.sample)
-            pairs += len(kept.sample.disparities)
+            chosen.append(kept.disparities)
+            pairs += len(kept.disparities)
             if pairs >= needed:
-                return together(chosen), len(chosen)
-        return sample, 1
+                return np.concatenate(chosen), len(chosen)
+        return disparities, 1

@@ -91,7 +91,7 @@ def _detection(everywhere: Sequence[Kind], calibrations: dict[str, Calibration])
         f"## What it finds\n\n{len(flown)} flights of 3 scans, each judged under every fault; P_FA {detection.P_FA:g}. "
         f"Counted are flights\nwith at least {detection.ENOUGH_PAIRS} pairs in one of their first two scans without a "
         "fault, and alerts within two scans.\nShifts go to eight directions in turn. Each test alone has the whole "
-        "P_FA (shift and\nthe unmatched share of terrain shadows 95 hundredths); the default splits it.\n\n"
+        "P_FA;\nthe default splits it.\n\n"
         + detection.by_fault(flown, calibrations)
         + "\n\nSingle scans over shifted terrain by their number of pairs, and the minimum detectable bias that the "
         "published test\npromises at P_MD 0.001 with the calibrated rms:\n\n" + detection.by_pairs(flown, calibrations)

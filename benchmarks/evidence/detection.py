@@ -6,11 +6,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import ndtri
 
+from benchmarks.evidence.false_alerts import found, unmatched
 from benchmarks.evidence.faults import FAULTS, NONE, SCAN_S
 from benchmarks.evidence.flown import TERRAINS, Flown
 from benchmarks.evidence.tables import share, table
 from monitor.calibration import Calibration
-from monitor.decision import Findings, examine
+from monitor.decision import examine, shift_test
 from monitor.disparity import minimum_detectable_bias
 from monitor.sample import ScanSample
 from monitor.settings import MonitorSettings
@@ -28,22 +29,16 @@ def _by_test(scan: ScanSample, calibration: Calibration) -> dict[str, bool]:
     """What each test alone, at the whole P_FA, and the default say."""
     paper = examine(scan, MonitorSettings(p_fa=P_FA, method="paper"), calibration)
     alone = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_dem_budget=0.0), calibration)
-    shift = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.95, unmatched_dem_budget=0.0), calibration)
-    shares = examine(scan, MonitorSettings(p_fa=P_FA, shift_budget=0.0, unmatched_dem_budget=0.95), calibration)
-    default = examine(scan, MonitorSettings(p_fa=P_FA), calibration)
+    enough = len(scan.disparities) >= ENOUGH_PAIRS
     verdicts = (
         bool(paper.alerts),
-        _statistic(alone),
-        shift.shift is not None and shift.shift.exceeded,
-        shares.unmatched_dem is not None and shares.unmatched_dem.exceeded,
+        found(alone.statistic),
+        enough and found(shift_test(scan, calibration, P_FA)),
+        found(unmatched(scan, calibration, P_FA)),
         _mean(scan, calibration),
-        bool(default.alerts),
+        bool(examine(scan, MonitorSettings(p_fa=P_FA), calibration).alerts),
     )
     return dict(zip(WAYS, verdicts, strict=True))
-
-
-def _statistic(found: Findings) -> bool:
-    return found.statistic is not None and found.statistic.exceeded
 
 
 def _mean(scan: ScanSample, calibration: Calibration) -> bool:
@@ -76,8 +71,8 @@ def by_fault(flown: Sequence[Flown], calibrations: dict[str, Calibration]) -> st
             for name in TERRAINS
         ]
         first = [next((k for k, scan in enumerate(scans) if scan["default"]), None) for scans in said]
-        found = sorted(k for k in first if k is not None)
-        soon = f"{SCAN_S * (found[len(found) // 2] + 1):.0f} s" if found else ""
+        when = sorted(k for k in first if k is not None)
+        soon = f"{SCAN_S * (when[len(when) // 2] + 1):.0f} s" if when else ""
         rows.append([fault.name.removesuffix(" 0"), *shares, *over, soon])
     return table(["fault", *WAYS, *(f"default, {name}" for name in TERRAINS), "median time to alert"], rows)
 

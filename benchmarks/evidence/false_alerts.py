@@ -10,12 +10,11 @@ from scipy.stats import binom
 from benchmarks.evidence.flown import Flown
 from benchmarks.evidence.tables import rate, table
 from monitor.calibration import Calibration
-from monitor.decision import examine, unmatched_threshold
+from monitor.decision import DEM_SHARE, Test, examine, shift_test, unmatched_test
 from monitor.disparity import robust_statistic
 from monitor.fitting import fit
 from monitor.sample import ScanSample
 from monitor.settings import MonitorSettings
-from monitor.shift import score, shift_statistic, shift_threshold
 
 P_FAS = (1e-1, 1e-2, 1e-3)
 MINIMUM_PAIRS = 16
@@ -46,10 +45,20 @@ def tests(calibration: Calibration, pool: Sequence[ScanSample]) -> dict[str, Ale
         "T as published": _decision(calibration, method="paper"),
         "Q": _decision(calibration, shift_budget=0.0, unmatched_dem_budget=0.0),
         DEFAULT: _decision(calibration),
-        "the shift statistic": Shift(calibration),
-        "unmatched terrain shadows": Unmatched(calibration),
+        "the shift statistic": lambda scan, p_fa: found(shift_test(scan, calibration, p_fa)),
+        "unmatched terrain shadows": lambda scan, p_fa: found(unmatched(scan, calibration, p_fa)),
         "Q against a bootstrap": Bootstrap(calibration, pool),
     }
+
+
+def found(test: Test | None) -> bool:
+    """Whether a test that could be made exceeds its limit."""
+    return test is not None and test.exceeded
+
+
+def unmatched(scan: ScanSample, calibration: Calibration, p_fa: float) -> Test | None:
+    """The test of unmatched terrain shadows alone."""
+    return unmatched_test(DEM_SHARE, scan.unmatched_dem, calibration.unmatched_dem, p_fa)
 
 
 def _decision(calibration: Calibration, **options: str | float) -> Alerts:
@@ -58,35 +67,6 @@ def _decision(calibration: Calibration, **options: str | float) -> Alerts:
         return bool(examine(scan, settings, calibration).alerts)
 
     return alerts
-
-
-class Shift:
-    """The shift statistic with the whole probability of a false alert."""
-
-    def __init__(self, calibration: Calibration) -> None:
-        if calibration.common is None:
-            raise ValueError(f"calibration {calibration.name} has no common errors: fit them")
-        self._calibration, self._common = calibration, calibration.common
-
-    def __call__(self, scan: ScanSample, p_fa: float) -> bool:
-        """Whether it exceeds its threshold."""
-        c = self._calibration
-        found = score(scan, c.median_bins, c.clip_bins)
-        return shift_statistic(found, c.sigma_bins, self._common) > shift_threshold(p_fa)
-
-
-class Unmatched:
-    """The share of unmatched terrain shadows with the whole probability of a false alert."""
-
-    def __init__(self, calibration: Calibration) -> None:
-        if calibration.unmatched_dem is None:
-            raise ValueError(f"calibration {calibration.name} has no unmatched terrain shadows: fit one")
-        self._model = calibration.unmatched_dem
-
-    def __call__(self, scan: ScanSample, p_fa: float) -> bool:
-        """Whether it exceeds its threshold."""
-        found = scan.unmatched_dem
-        return found.share is not None and found.share > unmatched_threshold(found.eligible, self._model, p_fa)
 
 
 class Bootstrap:

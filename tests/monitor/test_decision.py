@@ -5,11 +5,11 @@ import pytest
 from scipy.stats import betabinom, binom, chi2
 
 from monitor.calibration import Calibration, CommonErrors, UnmatchedModel
-from monitor.decision import DEM_SHARE, RADAR_SHARE, examine, pairs_for_verdict, unmatched_threshold
+from monitor.decision import DEM_SHARE, RADAR_SHARE, examine, pairs_for_verdict, unmatched_threshold, untested
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
 
-MODEL = UnmatchedModel(mean=0.3, overdispersion=0.02)
+MODEL = UnmatchedModel(mean=0.3, overdispersion=0.02, least_size=8)
 CALIBRATION = Calibration(
     name="made",
     provenance="made up",
@@ -108,6 +108,31 @@ def test_disparities_that_follow_the_cosine_of_the_azimuth_alert_where_their_squ
     found = examine(shifted, MonitorSettings(p_fa=1e-3), CALIBRATION)
     assert [test.name for test in found.alerts] == ["the shift statistic"]
     assert not examine(shifted, MonitorSettings(p_fa=1e-3), BARE).alerts
+
+
+def test_a_calibration_without_what_a_test_needs_leaves_its_share_to_q_and_says_so() -> None:
+    settings = MonitorSettings(p_fa=1e-3)
+    old = CALIBRATION.model_copy(
+        update={"common": None, "unmatched_dem": UnmatchedModel(mean=0.3, overdispersion=0.02)}
+    )
+    found = examine(sample(dem=MANY), settings, old)
+    assert (found.shift, found.unmatched_dem) == (None, None)
+    assert found.statistic is not None
+    assert found.statistic.limit == pytest.approx(chi2.isf(1e-3, 40))
+    shift, unmatched = untested(settings, old)
+    assert shift == "shifts are not tested: calibration made has no errors in common, make it anew"
+    assert "of 8 bins and more are not tested: calibration made has those of 3 bins and more" in unmatched
+    assert not untested(settings, CALIBRATION)
+    assert not untested(settings.model_copy(update={"method": "paper"}), old)
+
+
+def test_a_window_lends_pairs_to_the_statistic_and_to_no_other_test() -> None:
+    """What the newest scan says of shifts and of unmatched shadows is not thinned by the scans before."""
+    settings, few = MonitorSettings(p_fa=1e-3), sample(n=9, dem=MANY)
+    gathered = examine(few, settings, CALIBRATION, np.full(40, 1.0))
+    assert gathered.statistic is not None
+    assert [test.name for test in gathered.alerts] == [DEM_SHARE]
+    assert gathered.shift is None
 
 
 def test_q_and_t_are_both_told_whatever_decides() -> None:

@@ -23,6 +23,7 @@ IMPOSSIBLE: list[tuple[str, list[Any], str]] = [
     ("minimum_size", [0, -1, 10**30], "(greater than or equal to 1|less than or equal to 65536)"),
     ("maximum_size", [0, -1, 10**30], "(greater than or equal to 1|less than or equal to 65536)"),
     ("maximum_size", [2], "maximum_size 2 is below minimum_size 3"),
+    ("maximum_size", [7], "maximum_size 7 is below unmatched_size 8"),
     ("unmatched_dem_budget", [-0.1, 0.96, nan, inf], "(greater than or equal to 0|less than or equal to 0.95)"),
     ("unmatched_radar_budget", [-0.1, 0.96, nan, inf], "(greater than or equal to 0|less than or equal to 0.95)"),
     ("shift_budget", [-0.1, 0.96, nan, inf], "(greater than or equal to 0|less than or equal to 0.95)"),
@@ -71,7 +72,12 @@ def test_no_option_is_left_out_of_the_impossible_ones() -> None:
     [
         {"p_fa": 0.499, "p_md": 0.999, "minimum_pairs": 2, "azimuth_fan": 1, "azimuth_span": 2, "control_delay_s": 0},
         {"refraction_k": inf, "radial_spacing_deg": 0.01, "range_limit_nm": 320, "beam_width_deg": 30},
-        {"minimum_size": 3, "maximum_size": 3, "lever_arm": {"forward_m": -100, "right_m": 100, "down_m": 100}},
+        {
+            "minimum_size": 3,
+            "maximum_size": 3,
+            "unmatched_size": 3,
+            "lever_arm": {"forward_m": -100, "right_m": 100, "down_m": 100},
+        },
     ],
 )
 def test_what_is_just_possible_is_taken(possible: dict[str, object]) -> None:

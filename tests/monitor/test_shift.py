@@ -88,13 +88,13 @@ def test_a_shift_that_the_sum_of_squares_does_not_show_is_found() -> None:
     assert found > 2 * squares
 
 
-@pytest.mark.parametrize(("place", "stretch"), [(0.2, 0.0), (1.0, 0.0), (0.3, 0.1), (0.0, 0.05)])
+@pytest.mark.parametrize(("place", "stretch"), [(0.2, 0.0), (1.0, 0.0), (0.3, 0.1), (0.0, 0.2)])
 def test_the_errors_in_common_are_measured(place: float, stretch: float) -> None:
     common = CommonErrors(place_bins=place, stretch=stretch)
     scans = [score(one, 0.0, WIDE) for one in flown(4, 1.5, common, scans=4000)]
     made = common_errors(scans, 1.5)
     # A shift moves all disparities of a sector together, which looks like a little stretch.
-    assert made.stretch == pytest.approx(stretch, rel=0.05, abs=0.03)
+    assert made.stretch == pytest.approx(stretch, rel=0.05, abs=0.03 if not stretch else 0.0)
     assert made.place_bins == pytest.approx(place, rel=0.15, abs=0.1)
     assert np.mean([shift_statistic(one, 1.5, made) for one in scans]) == pytest.approx(2.0, rel=0.01)
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from monitor.sample import ScanSample, Unmatched, signal_level
+from monitor.sample import signal_level
 from monitor.window import Window
 
 SECOND_NS = 1_000_000_000
@@ -11,32 +12,30 @@ NEEDED = 16
 SETTING = (10.0, 512)
 
 
-def scan(pairs: int, mark: float) -> ScanSample:
-    return ScanSample(
-        np.full(pairs, mark), np.full(pairs, -mark), np.full(pairs, 9.0), Unmatched(1, pairs), Unmatched(2, 10), mark
-    )
+def scan(pairs: int, mark: float) -> NDArray[np.float64]:
+    """The disparities of a scan."""
+    return np.full(pairs, mark)
 
 
-def fed(window: Window, *scans: ScanSample) -> tuple[ScanSample, int]:
+def fed(window: Window, *scans: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
     """What the last of scans, four seconds apart, comes to."""
     found = [window.gather(4 * k * SECOND_NS, SETTING, one, NEEDED) for k, one in enumerate(scans)]
     return found[-1]
 
 
 def test_a_scan_with_enough_pairs_stands_alone() -> None:
-    sample, scans = fed(Window(5), scan(20, 1.0), scan(16, 2.0))
-    assert (sample.disparities.tolist(), scans) == ([2.0] * 16, 1)
+    found, scans = fed(Window(5), scan(20, 1.0), scan(16, 2.0))
+    assert (found.tolist(), scans) == ([2.0] * 16, 1)
 
 
 def test_as_many_scans_before_it_are_taken_as_it_needs() -> None:
-    sample, scans = fed(Window(5), scan(9, 1.0), scan(6, 2.0), scan(6, 3.0), scan(6, 4.0))
-    assert (sample.disparities.tolist(), scans) == ([4.0] * 6 + [3.0] * 6 + [2.0] * 6, 3)
-    assert (sample.unmatched_radar, sample.unmatched_dem, sample.level) == ((3, 18), (6, 30), 4.0)
+    found, scans = fed(Window(5), scan(9, 1.0), scan(6, 2.0), scan(6, 3.0), scan(6, 4.0))
+    assert (found.tolist(), scans) == ([4.0] * 6 + [3.0] * 6 + [2.0] * 6, 3)
 
 
 def test_without_enough_in_all_of_them_the_scan_stands_alone() -> None:
-    sample, scans = fed(Window(2), scan(9, 1.0), scan(6, 2.0), scan(6, 3.0))
-    assert (len(sample.disparities), scans) == (6, 1)
+    found, scans = fed(Window(2), scan(9, 1.0), scan(6, 2.0), scan(6, 3.0))
+    assert (len(found), scans) == (6, 1)
 
 
 @pytest.mark.parametrize(
