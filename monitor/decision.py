@@ -132,10 +132,15 @@ def _shares(settings: MonitorSettings, calibration: Calibration) -> _Shares:
         return _Shares(s.p_fa, 0.0, 0.0, 0.0)
     shift = 0.0 if c.common is None else s.shift_budget
     radar, dem = (
-        0.0 if model is None or model.least_size != s.unmatched_size else budget
+        budget if _holds(model, s) else 0.0
         for model, budget in ((c.unmatched_radar, s.unmatched_radar_budget), (c.unmatched_dem, s.unmatched_dem_budget))
     )
     return _Shares(s.p_fa * (1 - shift - radar - dem), s.p_fa * shift, s.p_fa * radar, s.p_fa * dem)
+
+
+def _holds(model: UnmatchedModel | None, settings: MonitorSettings) -> bool:
+    """Whether a model is of the shadows that are counted."""
+    return model is not None and model.least_size == settings.unmatched_size
 
 
 def untested(settings: MonitorSettings, calibration: Calibration) -> list[str]:
@@ -146,7 +151,7 @@ def untested(settings: MonitorSettings, calibration: Calibration) -> list[str]:
     if calibration.common is None and settings.shift_budget:
         found.append(f"shifts are not tested: calibration {name} has no errors in common, make it anew")
     model = calibration.unmatched_dem
-    if settings.unmatched_dem_budget and (model is None or model.least_size != settings.unmatched_size):
+    if settings.unmatched_dem_budget and not _holds(model, settings):
         has = f"those of {model.least_size} bins and more" if model else "none"
         wanted = f"of {settings.unmatched_size} bins and more"
         found.append(f"unmatched terrain shadows {wanted} are not tested: calibration {name} has {has}, make it anew")

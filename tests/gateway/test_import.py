@@ -73,8 +73,8 @@ def test_ballard_and_max_technologies_files_give_the_same_verdicts(
     assert figures(first) == figures(second)
     told = only(IntegrityEvent, first)
     assert len(told) == 3
-    # Words of one file come in their order with those of other files, or after them: the aircraft is some millimetres
-    # elsewhere, and a bin on the brink may be lit in one and dark in the other.
+    # One adapter's clock is matched to the chunks of one file, those of four to four: the aircraft is centimetres
+    # elsewhere at most, and a bin on the brink may be lit in one and dark in the other.
     sizes = [
         [x for e in some for x in (e.t_bins2, e.q) if x is not None] for some in (told, only(IntegrityEvent, second))
     ]
