@@ -83,12 +83,14 @@ class Scan:
 class SweepWatch:
     """Tells radials that certainly go on with their sweep from those that may end it, by their header bits alone.
 
-    Certain is the same tilt, range, mode and stabilisation, and a step in the direction of the step before, farther
-    than any tremble and nearer than any jump. Whoever must know at once when a sweep ends need not look at such ones.
+    Certain is the same tilt, range, mode and stabilisation, and a step nearer than any jump: one farther than any
+    tremble in the direction of the step before, any at all after a jump, which has begun a sweep, or one tremble after
+    a step so large that the antenna has surely moved. Whoever must know at once when a sweep ends need not look at
+    such ones.
     """
 
     def __init__(self) -> None:
-        self.last = np.zeros(4, np.int64)  # of the radial before: settings, angle code, direction, time
+        self.last = np.zeros(4, np.int64)  # of the radial before: settings, angle code, step to it in codes or 0, time
 
     def goes_on(self, time_ns: int, header: int) -> bool:
         """Whether a radial goes on, by its first 64 bits as a signed integer, bit 0 the least significant."""
@@ -100,10 +102,12 @@ class SweepWatch:
 @njit(cache=True)
 def goes_on(last: NDArray[np.int64], time_ns: Int, header: Int) -> bool:
     """Whether a radial certainly goes on with the sweep of the one before."""
-    settings, code, direction, before_ns = last
+    settings, code, before, before_ns = last
     step = _step_codes(code, header)
     same = header & SETTINGS_MASK == settings and 0 < time_ns - before_ns <= SILENCE_NS // 2  # whatever its clock
-    return bool(same and MOVES_CODES <= step * direction <= JUMP_CODES)
+    moves = abs(step) >= MOVES_CODES and (step * before > 0 or abs(before) > JUMP_CODES)
+    rests = abs(step) < MOVES_CODES < abs(before)
+    return bool(same and abs(step) <= JUMP_CODES and (moves or rests))
 
 
 @njit(cache=True)
@@ -111,7 +115,7 @@ def follow(last: NDArray[np.int64], time_ns: Int, header: Int) -> None:
     """Make a radial the one before."""
     step = _step_codes(last[1], header)
     last[0], last[1], last[3] = header & SETTINGS_MASK, header >> ANGLE_BIT & ANGLE_MASK, time_ns
-    last[2] = 0 if abs(step) < MOVES_CODES else 1 if step > 0 else -1
+    last[2] = 0 if abs(step) < MOVES_CODES else step
 
 
 @njit(cache=True)

@@ -4,9 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
-from decoders.arinc708 import Radials
-from monitor.scans import LONGEST_SWEEP, STUCK_NS, Scan, ScanBuilder
+from decoders.arinc708 import Radials, unpack
+from monitor.scans import ANGLE_BIT, ANGLE_BITS, LONGEST_SWEEP, STUCK_NS, Scan, ScanBuilder, SweepWatch
+from simulators import arinc708
 
 MS = 1_000_000
 STEP_MS = 20
@@ -336,3 +339,31 @@ def test_a_radar_that_changes_its_tilt_with_each_sweep_has_its_ends_compared_all
     for k, angles in enumerate([FULL, FULL, FULL[:-4], FULL, FULL]):
         sweeps.feed(radials(angles, tilt_deg=float(k % 2)))
     assert [scan.cut_off for scan in sweeps.finish()] == [0, 0, 4, 0, 0]
+
+
+STEPS_CODES = st.one_of(st.sampled_from([-6, 6]), st.integers(-8, 8), st.integers(-700, 700))
+CODES = 1 << ANGLE_BITS
+
+
+@given(st.lists(st.tuples(STEPS_CODES, st.sampled_from([STEP_MS, 400, 900, 1100]), st.booleans()), max_size=60))
+@example([(6, STEP_MS, False), (-1, 400, False), (2, 900, False), (-1, 900, False), (2, 900, False)])
+def test_a_radial_that_certainly_goes_on_never_ends_a_sweep(steps: list[tuple[int, int, bool]]) -> None:
+    watch, builder, code, now_ns, tilt_deg = SweepWatch(), ScanBuilder(), 0, 0, -2.0
+    for step, after_ms, tilts in steps:
+        code, now_ns, tilt_deg = (code + step) % CODES, now_ns + after_ms * MS, -tilt_deg if tilts else tilt_deg
+        angle_deg = (code * 360 / CODES + 180) % 360 - 180
+        word = arinc708.encode(np.zeros(512, int), scan_angle_deg=angle_deg, tilt_deg=tilt_deg, range_nm=10.0)
+        certain = watch.goes_on(now_ns, int.from_bytes(word[:8], "little", signed=True))
+        ended = [*builder.feed(np.array([now_ns]), unpack(np.frombuffer(word, np.uint8)[None]))]
+        assert not (certain and ended)
+
+
+@pytest.mark.parametrize(
+    ("before", "step", "certain"),
+    [(6, 6, True), (6, -6, False), (6, 0, True), (2, 0, False), (0, 6, False), (2000, 6, True), (2000, 700, False)],
+)
+def test_what_certainly_goes_on(before: int, step: int, certain: bool) -> None:
+    watch = SweepWatch()
+    for k, code in enumerate((1000, 1000 + before)):
+        watch.goes_on(k * MS, code << ANGLE_BIT)
+    assert watch.goes_on(2 * MS, 1000 + before + step << ANGLE_BIT) is certain
