@@ -13,7 +13,7 @@ from decoders.health429 import BusHealth
 from decoders.profiles import Profile
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # two that are read alike still are two, each with its own health
 class Channel429:
     """An ARINC 429 channel: how to read its labels, when their values were true, and how well the bus behaves."""
 

@@ -59,7 +59,8 @@ class Link:
                     profile_of(channel.profile) if channel.profile else self.radar_profile
                 )
             elif channel.definitions:
-                self._take(number, definitions_of(channel.definitions), channel.orientation, f.KIND_429_HIGH)
+                definitions = definitions_of(channel.definitions)
+                self.channels[number] = self._read_by(number, definitions, channel.orientation, f.KIND_429_HIGH)
 
     def succeed(self, before: "Link") -> None:
         """Take over the channels and counters of a link whose pipeline failed; bytes half framed are lost with it."""
@@ -67,23 +68,28 @@ class Link:
         self.books = before.books
         self.framer.succeed(before.framer)
 
-    def hello(self, hello: Hello) -> None:
-        """Take what the bridge says of its channels; what the configuration says goes first."""
+    def announced(self, hello: Hello) -> dict[int, Channel429 | Channel708]:
+        """The channels that are other ones than so far, as the bridge says; what the configuration says goes first.
+
+        A bridge says the same again every few seconds, and the health of its buses goes on.
+        """
+        found: dict[int, Channel429 | Channel708] = {}
         for said in hello.channels:
             configured = self.config.channels.get(said.channel)
             if configured and (configured.kind == "arinc708" or configured.definitions):
                 continue
             if said.kind == f.KIND_708 and not configured:
-                self.channels[said.channel] = Channel708(self.radar_profile)
+                found[said.channel] = Channel708(self.radar_profile)
             elif said.kind in (f.KIND_429_LOW, f.KIND_429_HIGH) and said.orientation < len(f.ORIENTATIONS):
                 name = for_equipment(said.equipment_id)
                 if name is None:
                     self.counters["channels_of_unknown_equipment"] += 1
                 else:
                     orientation = configured.orientation if configured else f.ORIENTATIONS[said.orientation]
-                    self._take(said.channel, load_definitions(name), orientation, said.kind)
+                    found[said.channel] = self._read_by(said.channel, load_definitions(name), orientation, said.kind)
             else:
                 self.counters["channels_of_unknown_kind"] += 1
+        return {number: channel for number, channel in found.items() if self.channels.get(number) != channel}
 
     def identify(self, packet: Packet) -> str | None:
         """Take a channel that nobody announced by its own equipment label (377); return the set it is read by now.
@@ -100,15 +106,16 @@ class Link:
             if name and self._said.get(number) == equipment:
                 configured = self.config.channels.get(number)
                 orientation = configured.orientation if configured else "wire"
-                self._take(number, load_definitions(name), orientation, f.KIND_429_HIGH)
+                self.channels[number] = self._read_by(number, load_definitions(name), orientation, f.KIND_429_HIGH)
                 return name
             self._said[number] = equipment
         return None
 
-    def _take(self, number: int, definitions: Definitions, orientation: str, kind: int) -> None:
+    def _read_by(self, number: int, definitions: Definitions, orientation: str, kind: int) -> Channel429:
+        """The channel if it is read in this way, the one that it is if it was before."""
         before = self.channels.get(number)
         if isinstance(before, Channel429) and before.reads(definitions, orientation, kind):
-            return  # a bridge says the same again every few seconds, and the health of the bus goes on
+            return before
         configured = self.config.channels.get(number)
         delays_ns = np.zeros(256, np.int64)
         for label, delay_ms in configured.delays_ms.items() if configured else ():
@@ -118,7 +125,7 @@ class Link:
                 delays_ns[row.label] = delays_ns[row.fine_of]
         if TIME in definitions.labels and definitions.labels[TIME].encoding == "time":
             delays_ns[[*UTC_LABELS]] = delays_ns[TIME]
-        self.channels[number] = Channel429(
+        return Channel429(
             definitions,
             BusHealth(definitions, orientation, kind),
             kind,

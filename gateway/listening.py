@@ -243,9 +243,9 @@ class Listener:
         elif packet.type == f.WORD_708:
             self._radar(link, packet, record)
         elif packet.type == f.HELLO:
-            said = hello(packet)
-            self._read()  # as it was announced until now
-            link.hello(said)
+            if new := link.announced(hello(packet)):
+                self._read()  # as it was announced until now
+                link.channels |= new
             self._expect(link, record)
         elif packet.type == f.HEARTBEAT:
             self._heartbeat(link, packet)

@@ -119,7 +119,7 @@ class WordStage:
                 continue
             try:
                 if packet.type == f.HELLO:
-                    link.hello(hello(packet))
+                    link.channels |= link.announced(hello(packet))
                 elif packet.type == f.WORDS_429:
                     yield self._block(link, packet, record)
                 elif packet.type == f.WORD_708:

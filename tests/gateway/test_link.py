@@ -193,7 +193,7 @@ def test_a_radar_word_names_its_channel_where_no_bridge_can_say_hello(source: st
 @pytest.mark.parametrize(("orientation", "name"), list(enumerate(f.ORIENTATIONS)))
 def test_a_hello_tells_equipment_and_orientation(kind: int, orientation: int, name: str) -> None:
     link = make()
-    link.hello(said(3, kind, orientation, 0x04))
+    link.channels |= link.announced(said(3, kind, orientation, 0x04))
     channel = link.channels[3]
     assert isinstance(channel, Channel429)
     assert (channel.definitions.name, channel.orientation) == ("iru_704", name)
@@ -201,14 +201,22 @@ def test_a_hello_tells_equipment_and_orientation(kind: int, orientation: int, na
 
 def test_a_hello_names_a_radar_channel() -> None:
     link = make()
-    link.hello(said(0, f.KIND_708))
+    link.channels |= link.announced(said(0, f.KIND_708))
     assert link.channels == {0: Channel708(load_profile("arinc708"))}
+
+
+def test_what_a_hello_says_again_is_no_news() -> None:
+    link = make()
+    for _ in range(2):
+        link.channels |= link.announced(said(0, f.KIND_708)) | link.announced(said(3, f.KIND_429_HIGH, 0, 0x04))
+    assert link.announced(said(0, f.KIND_708)) == link.announced(said(3, f.KIND_429_HIGH, 0, 0x04)) == {}
+    assert [*link.announced(said(3, f.KIND_429_LOW, 0, 0x04))] == [3]
 
 
 def test_unknown_kinds_equipment_and_orientations_are_counted() -> None:
     link = make()
     for hello in (said(1, 0x55), said(2, f.KIND_429_LOW, 2, 4), said(3, f.KIND_429_LOW, 0, 0xEE)):
-        link.hello(hello)
+        link.channels |= link.announced(hello)
     assert link.channels == {}
     assert link.counters["channels_of_unknown_kind"] == 2
     assert link.counters["channels_of_unknown_equipment"] == 1
@@ -220,8 +228,8 @@ def test_configured_channels_win_over_the_hello() -> None:
         n2={"kind": "arinc708", "profile": "wxr2100_6bit"},
     )
     configured = dict(link.channels)
-    link.hello(said(1, f.KIND_429_LOW, 0, 0x04))
-    link.hello(said(2, f.KIND_429_LOW, 0, 0x04))
+    link.channels |= link.announced(said(1, f.KIND_429_LOW, 0, 0x04))
+    link.channels |= link.announced(said(2, f.KIND_429_LOW, 0, 0x04))
     assert link.channels == configured
     channel = configured[1]
     assert isinstance(channel, Channel429)
@@ -231,7 +239,7 @@ def test_configured_channels_win_over_the_hello() -> None:
 
 def test_a_channel_configured_without_definitions_takes_them_from_the_hello() -> None:
     link = make(n1={"kind": "arinc429", "orientation": "label_swapped"})
-    link.hello(said(1, f.KIND_429_LOW, 0, 0x04))
+    link.channels |= link.announced(said(1, f.KIND_429_LOW, 0, 0x04))
     channel = link.channels[1]
     assert isinstance(channel, Channel429)
     assert (channel.definitions.name, channel.orientation) == ("iru_704", "label_swapped")
