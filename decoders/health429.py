@@ -108,10 +108,11 @@ class BusHealth:
         changed, flags, mean_ms, silent_ms, shared = kernels.settle(
             now_ns, self._shortest_ms, self._longest_ms, self._told, self._sources, *self._rates
         )
-        for label, *found in zip(*(column.tolist() for column in (changed, flags, mean_ms, silent_ms)), strict=True):
-            yield from self._rate(label, *found)
-        if self._known[:2].sum() >= ENOUGH_WORDS:
-            yield from self._reading(*self._known.tolist())
+        for k, label in enumerate(changed.tolist()):
+            yield from self._rate(label, int(flags[k]), float(mean_ms[k]), float(silent_ms[k]))
+        good, bad, *known = self._known.tolist()
+        if good + bad >= ENOUGH_WORDS:
+            yield from self._reading(good, bad, *known)
             self._known[:] = 0
         form = "labels {} come from several sources (SDI): say with sdi which one the channel is to use"
         labels = ", ".join(f"{label:03o}" for label in shared.tolist())

@@ -8,7 +8,7 @@ import re
 import struct
 import zlib
 from collections.abc import Callable
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, ClassVar, Final, Literal, NamedTuple
 
 import numpy as np
@@ -288,7 +288,13 @@ def radar_word(packet: Packet) -> RadarWord:
 def hello(packet: Packet) -> Hello:
     """What a bridge says of itself. Raises ValueError for another type, MalformedBody for a body cut short."""
     _require(packet, f.HELLO, "hello")
-    body = _parse("HELLO", packet.body)
+    return _hello(packet.body)
+
+
+@lru_cache(maxsize=64)
+def _hello(said: bytes) -> Hello:
+    """The same again every few seconds, and it takes longer to read than all the words between."""
+    body = _parse("HELLO", said)
     channels = tuple(HelloChannel(c.channel, c.kind, c.orientation, c.equipment_id) for c in body.channels)
     return Hello(body.serial_number, body.firmware, channels)
 

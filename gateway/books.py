@@ -35,8 +35,10 @@ class Count:
 
     def say(self, said: int, anew: int) -> None:
         """Take what the next heartbeat says; the value is `anew` if it continues none."""
-        ahead = [((said - earlier) % COUNT_RANGE, value) for earlier, value in self._before]
-        more, value = min(ahead, default=(LARGEST_LEAP, 0))
+        nearest = LARGEST_LEAP, 0
+        for earlier, value in self._before:
+            nearest = min(nearest, ((said - earlier) % COUNT_RANGE, value))
+        more, value = nearest
         self.value = value + more if more < LARGEST_LEAP else anew
         self._before = [*self._before[-1:], (said, self.value)]
 
