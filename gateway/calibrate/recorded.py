@@ -14,7 +14,8 @@ from gateway.core import Core
 from gateway.errors import GatewayError
 from gateway.pipeline import Pipeline
 from gateway.recording import Recording
-from gateway.reprocess.job import RECORDS_AT_ONCE, Job, set_up
+from gateway.reprocess.job import Job
+from gateway.reprocess.work import RECORDS_AT_ONCE, set_up
 from monitor.comparison import Comparison
 from monitor.integrity import Monitor
 from monitor.residuals import residuals
@@ -63,7 +64,7 @@ class Read:
 
 def read(job: Job) -> Read:
     """All scans of a recording. Raises GatewayError naming what is wrong."""
-    recording = Recording(job.path)
+    recording = Recording(job.files)
     config, recorded = set_up(job, recording)
     if recorded is None:
         raise GatewayError(f"{job.path} was recorded without terrain: name the reference terrain with --dem")

@@ -26,14 +26,18 @@ def reprocess(
 
     from rich.progress import Progress
 
-    from gateway.config import load_config
     from gateway.errors import GatewayError
     from gateway.reprocess.dataset import DataSet
     from gateway.reprocess.job import jobs
     from gateway.reprocess.run import reprocess as bring_up_to_date
     from gateway.tables import plain_console, print_table
 
-    listed = jobs(directory, load_config(config) if config else None, dem or (), water or ())
+    given = None
+    if config:
+        from gateway.config import load_config  # which takes longer than all the rest
+
+        given = load_config(config)
+    listed = jobs(directory, given, dem or (), water or ())
     data = DataSet(output)
     with Progress(console=plain_console(), transient=True) as bar:
         task = bar.add_task("recordings", total=len(listed))

@@ -14,6 +14,7 @@ from gateway.exports import Job
 from gateway.exports.labels import SCHEMA, batches
 from gateway.exports.scans import Judged, judged, monitor_of
 from gateway.link import SPOILT
+from gateway.verdict_columns import VERDICTS
 from gateway.words import Word708
 
 ROWS = 4096  # of a row group whose rows are gathered one by one
@@ -51,42 +52,6 @@ DISPARITIES = pa.schema(
         ("radar_centre_bin", pa.float64()),
         ("terrain_centre_bin", pa.float64()),
         ("disparity_bins", pa.float64()),
-    ]
-)
-VERDICTS = pa.schema(
-    [
-        ("utc_ns", pa.int64()),
-        ("sequence", pa.uint64()),
-        ("scan", pa.int64()),
-        ("verdict", pa.string()),
-        ("reasons", pa.list_(pa.string())),
-        ("method", pa.string()),
-        ("p_fa", pa.float64()),
-        ("n_pairs", pa.int64()),
-        ("scans", pa.int64()),
-        *(
-            (name, pa.float64())
-            for name in (
-                "t_bins2",
-                "t_normalised",
-                "q",
-                "threshold",
-                "mean_bins",
-                "mean_stderr_bins",
-                "shift",
-                "shift_limit",
-                "unmatched_radar",
-                "unmatched_radar_limit",
-                "unmatched_dem",
-                "unmatched_dem_limit",
-                "level",
-                "mdb_bins",
-                "offset_north_m",
-                "offset_east_m",
-                "offset_confidence",
-            )
-        ),
-        ("calibration", pa.string()),
     ]
 )
 

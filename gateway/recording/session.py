@@ -31,7 +31,7 @@ class Recording:
     """
 
     def __init__(self, source: Path | Sequence[Path]) -> None:
-        self.files = _files(source) if isinstance(source, Path) else list(source)
+        self.files = files_of(source) if isinstance(source, Path) else list(source)
         self.path = source if isinstance(source, Path) else self.files[0]
         self.metadata = metadata_of(self.files[0])
         self._found = Findings()
@@ -104,7 +104,8 @@ def sessions(files: Iterable[Path]) -> list[list[Path]]:
     return [[file for _, file in sorted(group)] for _, group in sorted(found.items())]
 
 
-def _files(path: Path) -> list[Path]:
+def files_of(path: Path) -> list[Path]:
+    """The files of a recording. Raises GatewayError for a directory that holds none or several."""
     if not path.is_dir():
         beside = sessions(path.parent.glob(f"*{path.suffix}"))
         return next((session for session in beside if session[0] == path), [path])

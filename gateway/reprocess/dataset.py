@@ -14,7 +14,10 @@ import pyarrow.parquet as pq
 
 from gateway.errors import GatewayError
 from gateway.reprocess.job import Outcome
+from gateway.verdict_columns import VERDICTS
 
+OF_THE_SCAN = ("radials", pa.int64()), ("range_nm", pa.float64()), ("tilt_deg", pa.float64())
+COLUMNS = pa.schema([("recording", pa.string()), *OF_THE_SCAN, *VERDICTS])
 RECORDINGS = pa.schema(
     [
         ("recording", pa.string()),
@@ -28,7 +31,7 @@ RECORDINGS = pa.schema(
         ("counters", pa.list_(pa.struct([("name", pa.string()), ("count", pa.int64())]))),
     ]
 )
-VERDICTS = ("ok", "alert", "unavailable")
+ANSWERS = ("ok", "alert", "unavailable")
 
 
 class DataSet:
@@ -47,7 +50,7 @@ class DataSet:
 
     def put(self, name: str, outcome: Outcome) -> None:
         """Keep a result, instead of an older one. Raises GatewayError if the disk does not take it."""
-        self._write(outcome.verdicts, self._path("verdicts", name))
+        self._write(pa.Table.from_pylist(outcome.verdicts, COLUMNS), self._path("verdicts", name))
         self._write(pa.Table.from_pylist([outcome.whole], RECORDINGS), self._path("recordings", name))
 
     def others(self, names: set[str]) -> list[str]:
@@ -63,7 +66,7 @@ class DataSet:
         counted = verdicts.group_by(["recording", "verdict"]).aggregate([([], "count_all")]).to_pylist()
         counts = {(row["recording"], row["verdict"]): row["count_all"] for row in counted}
         return [
-            {**row, **{verdict: counts.get((row["recording"], verdict), 0) for verdict in VERDICTS}}
+            {**row, **{verdict: counts.get((row["recording"], verdict), 0) for verdict in ANSWERS}}
             for row in recordings.drop_columns(["counters"]).to_pylist()
         ]
 

@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from typing import Final, NamedTuple
 
 import dask
@@ -11,7 +10,7 @@ from distributed import Client, LocalCluster, as_completed
 
 from gateway.errors import GatewayError
 from gateway.reprocess.dataset import DataSet
-from gateway.reprocess.job import Job, Outcome, key, work
+from gateway.reprocess.job import Job, Outcome
 from gateway.reprocess.workers import get_ready
 
 LOCAL: Final = {
@@ -69,6 +68,8 @@ def reprocess(jobs: Sequence[Job], data: DataSet, scheduler: str | None, progres
 
 def attempt(job: Job) -> Outcome | str:
     """The outcome of a job, or why there is none: whatever one recording brings up must not cost the others."""
+    from gateway.reprocess.work import work  # noqa: PLC0415 # only a worker needs it, and has it already
+
     try:
         return work(job)
     except GatewayError as error:
@@ -79,8 +80,14 @@ def attempt(job: Job) -> Outcome | str:
 
 def _holds(job: Job, data: DataSet, failed: dict[str, str]) -> bool:
     """Whether there is nothing to do for a job: its result holds, or it cannot be worked out."""
+
+    def key_now() -> str:
+        from gateway.reprocess.work import key  # noqa: PLC0415 # as above
+
+        return key(job)
+
     try:
-        return data.has(job.name, partial(key, job))
+        return data.has(job.name, key_now)
     except GatewayError as error:
         failed[job.name] = str(error)
         return True

@@ -22,10 +22,11 @@ from gateway.events import IntegrityEvent
 from gateway.metadata import recorded_config, recorded_monitor
 from gateway.recording import Recording
 from gateway.replay import replay
-from gateway.reprocess import job as job_module
+from gateway.reprocess import work as work_module
 from gateway.reprocess.dataset import DataSet
-from gateway.reprocess.job import Job, jobs, key, work
+from gateway.reprocess.job import Job, jobs
 from gateway.reprocess.run import reprocess
+from gateway.reprocess.work import key, work
 from monitor.calibration import uncalibrated
 from simulators.scenario import BUILT_IN_TERRAIN
 from tests.gateway.flown import record_flight
@@ -58,7 +59,7 @@ def said_by_replay(path: Path) -> list[tuple[object, ...]]:
 
 def test_the_verdicts_of_a_recording_are_those_of_its_replay(flights: Path) -> None:
     for job in jobs(flights, None, ()):
-        rows = work(job).verdicts.to_pylist()
+        rows = work(job).verdicts
         found = [(row["utc_ns"], row["scan"], row["verdict"], row["q"], tuple(row["reasons"])) for row in rows]
         assert found == said_by_replay(job.path)
         assert len(found) == 2
@@ -101,7 +102,7 @@ def test_only_what_is_new_or_has_changed_is_done_again(
     before = key(listed[0])
     os.utime(listed[0].path, ns=(1, 1))
     assert key(listed[0]) != before
-    monkeypatch.setattr(job_module, "code_version", lambda: "other code")
+    monkeypatch.setattr(work_module, "code_version", lambda: "other code")
     data.put(listed[1].name, work(listed[1]))
     monkeypatch.undo()
     assert not data.has(listed[1].name, partial(key, listed[1]))
@@ -121,7 +122,7 @@ class Changing:
             "terrain": [self.directory / "N44W072.hgt"],
             "calibration": self.directory / "radar.json",
         }
-        return Job("flight", self.path, json.dumps(check_config(table, "test").model_dump(mode="json")))
+        return Job("flight", (self.path,), json.dumps(check_config(table, "test").model_dump(mode="json")))
 
     def raise_terrain(self, metres: int) -> None:
         heights = np.fromfile(BUILT_IN_TERRAIN["white_mountains"], ">i2") + metres
@@ -135,7 +136,7 @@ class Changing:
         """What the verdicts say: their calibrations, and whether any finds the aircraft below ground; and the key."""
         outcome = work(self.job)
         assert outcome.whole["key"] == key(self.job)
-        rows = outcome.verdicts.to_pylist()
+        rows = outcome.verdicts
         below = any("below the stored terrain" in reason for row in rows for reason in row["reasons"])
         return {row["calibration"] for row in rows}, below, outcome.whole["key"]
 
@@ -180,8 +181,8 @@ def test_recordings_of_terrain_that_changes_meanwhile_are_refused_from_then_on(t
     changing = Changing(tmp_path / "own.mcap", tmp_path)
     changing.raise_terrain(0)
     record_flight(changing.path, 5, 1, terrain=[tmp_path / "N44W072.hgt"])
-    as_recorded = Job("own", changing.path)
-    assert work(as_recorded).verdicts.num_rows == 1
+    as_recorded = Job("own", (changing.path,))
+    assert len(work(as_recorded).verdicts) == 1
     changing.raise_terrain(1)
     for ask in (work, key):
         with pytest.raises(GatewayError, match=r"N44W072\.hgt changed since the recording was made"):
@@ -257,4 +258,6 @@ def test_on_a_cluster_whose_worker_is_killed_half_way_the_result_is_the_same(
     assert cluster.processes[1].returncode == -signal.SIGKILL
     assert (done.failed, len(done.made)) == ({}, COUNT)
     for job in listed:
-        assert pq.read_table(tmp_path / "out" / "verdicts" / f"{job.name}.parquet").equals(work(job).verdicts)
+        DataSet(tmp_path / "own").put(job.name, work(job))
+        there, own = (tmp_path / place / "verdicts" / f"{job.name}.parquet" for place in ("out", "own"))
+        assert pq.read_table(there).equals(pq.read_table(own))
