@@ -7,7 +7,7 @@ the horizontal distance below the line where eq. (5) writes the slant range, sin
 """
 
 import math
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numba import njit
@@ -17,12 +17,18 @@ from monitor.ceiling import clear_m
 from monitor.geodesy import Ray, along, bend, curvature_radii, ray
 from monitor.settings import MonitorSettings
 from monitor.shade import DEM_INITIAL, walk
-from monitor.terrain import Grid, bilinear, blend, corners, locate, sample
+from monitor.terrain import Grid, Real, bilinear, blend, corners, locate, sample
 
 SETTLED = 0.1  # of a bin: how far a bin's ground may move it and its place still counts as found
 LEVELS = (16, 4, 1)  # bins whose ground is looked up at once: every 16th, every fourth, every one
 LANES = 16  # bins a loop takes at a time; the first looked up is a multiple, or the rest would go one by one
 MOST_LOOKS = 40  # half of them halve a range setting to less than a centimetre
+
+# Of single precision eight bins go at a time, of double four. A place is then off by less than a centimetre in 100 km,
+# since it is counted from the antenna's own post, and a tangent by a part in 10^7. Any other number in their midst, be
+# it a whole one, would turn them into doubles.
+single: Any = np.float32  # or mypy would have Python's floats where these stand
+ZERO, ONE, NONE = single(0), single(1), single(math.nan)
 
 
 class Beam(NamedTuple):
@@ -54,18 +60,30 @@ class Pointing(NamedTuple):
 class Bins(NamedTuple):
     """Slant ranges in metres of the bins at each of `LEVELS`, and room to look up their ground. Made by `bins_at`."""
 
-    levels_m: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-    places: NDArray[np.float64]
+    levels_m: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]
+    places: NDArray[np.float32]
     post: NDArray[np.uint32]
     pairs: NDArray[np.complex64]
+
+
+class Way(NamedTuple):
+    """A ray in posts of the grid; and, if all of it is surely `inside`, from its `origin` in single precision.
+
+    The origin is the post north-west of where the ray begins, by its number in the grid. Made by `_way`.
+    """
+
+    track: Ray
+    inside: bool
+    origin: np.uint32
+    near: Ray
 
 
 @njit(cache=True)
 def bins_at(ranges_m: NDArray[np.float64]) -> Bins:
     """Bins at slant ranges (n,) in rising order."""
-    n = ranges_m.size
-    levels_m = (ranges_m[::16].copy(), ranges_m[::4].copy(), ranges_m.copy())
-    return Bins(levels_m, np.empty((5, n)), np.empty(n, np.uint32), np.empty((2, n), np.complex64))
+    n, every_m = ranges_m.size, ranges_m.astype(np.float32)
+    levels_m = (every_m[::16].copy(), every_m[::4].copy(), every_m)
+    return Bins(levels_m, np.empty((5, n), np.float32), np.empty(n, np.uint32), np.empty((2, n), np.complex64))
 
 
 def predict(
@@ -86,11 +104,11 @@ def _predict(  # type: ignore[no-untyped-def] # typed by predict
 ):
     states = np.full((azimuth_rad.size, ranges_m.size), DEM_INITIAL, np.int8)
     void = np.zeros(azimuth_rad.size, np.bool_)
-    delta = np.empty(ranges_m.size)
+    delta = np.empty(ranges_m.size, np.float32)
     bins = bins_at(ranges_m)
     for i in range(azimuth_rad.size):
-        dmin = math.tan(elevation_rad[i] - half_beam_rad)
-        dmax = math.tan(elevation_rad[i] + half_beam_rad)
+        dmin = single(math.tan(elevation_rad[i] - half_beam_rad))
+        dmax = single(math.tan(elevation_rad[i] + half_beam_rad))
         for f in range(fan_rad.size):
             azimuth = azimuth_rad[i] + fan_rad[f]
             void[i] |= tangents(grid, latitude_deg[i], longitude_deg[i], height_m[i], azimuth, bins, k, dmin, delta)
@@ -108,7 +126,7 @@ def tangents(
     bins: Bins,
     k: float,
     dmin: float,
-    delta: NDArray[np.float64],
+    delta: NDArray[np.floating],
 ) -> bool:
     """Tangent of the elevation of the ground at each slant range, into `delta`; True if any post was missing.
 
@@ -131,17 +149,19 @@ def tangents(
         below = height_m
     track = _in_posts(grid, ray(latitude_deg, longitude_deg, (height_m + below) / 2, azimuth_rad))
     ranges_m = bins.levels_m[-1]
-    tolerance = SETTLED * (ranges_m[1] - ranges_m[0]) if ranges_m.size > 1 else 0.0
+    tolerance = single(SETTLED) * (ranges_m[1] - ranges_m[0]) if ranges_m.size > 1 else ZERO
     clear = clear_m(grid.ceiling_m, track, height_m, dmin, tolerance, ranges_m[-1]) if drop >= 0 else 0.0
     begin = max(int(np.searchsorted(ranges_m, clear, "right")) - 1, 0) // LANES * LANES
-    _look(grid.height_m, track, height_m, below, bins, begin)
-    ground, guessed = bins.places[0], bins.places[2]
-    end = _settled(height_m, ground[begin:], guessed[begin:], ranges_m[begin:], tolerance, drop, delta[begin:])
+    _look(grid.height_m, _way(track, ranges_m[-1], grid.height_m.shape), single(height_m), single(below), bins, begin)
+    ground, guessed = bins.places[0][begin:], bins.places[2][begin:]
+    end = _settled(single(height_m), ground, guessed, ranges_m[begin:], tolerance, single(drop), delta[begin:])
+    ground = bins.places[0]
     first = max(begin, int(np.searchsorted(ranges_m, abs(height_m - below), "right")))
     delta[:first] = -math.inf
     for j in range(first, begin + end):
         if math.isnan(delta[j]):
-            for guess in (ground[j], ground[j - 1] if j else below):  # the second where the first leads over a void
+            before = ground[j - 1] if j else single(below)
+            for guess in (ground[j], before):  # the second where the first leads over a void
                 ground[j] = _settle(grid.height_m, track, height_m, guess, ranges_m[j], tolerance)
                 if not math.isnan(ground[j]):
                     break
@@ -161,20 +181,19 @@ def _settled(height_m, ground, guessed, ranges_m, tolerance, drop, delta):  # ty
     for j in range(ranges_m.size):
         depth = height_m - ground[j]
         s = _distance(ranges_m[j], depth)
-        settled = (abs(s - guessed[j]) <= tolerance) & (s > 0)
-        delta[j] = _lowered(-depth / s, s * drop) if settled else math.nan
+        settled = (abs(s - guessed[j]) <= tolerance) & (s > ZERO)
+        delta[j] = _lowered(-depth / s, s * drop) if settled else NONE
         end = max(end, 0 if settled else j + 1)
     return end
 
 
 @njit(cache=True, error_model="numpy")
-def _look(post_m, track, height_m, below_m, bins, begin):  # type: ignore[no-untyped-def] # typed by tangents
+def _look(post_m, way, height_m, below_m, bins, begin):  # type: ignore[no-untyped-def] # typed by tangents
     """Ground for each bin from `begin` on into the first of `places`, where it was looked up into the third.
 
-    Several plain loops, because each goes four bins at a time where one loop over all of it would go bin by bin; all
+    Several plain loops, because each goes eight bins at a time where one loop over all of it would go bin by bin; all
     count from 0, or numba would ask of each index whether it is negative.
     """
-    inside = stays_inside(track, bins.levels_m[-1][-1], post_m.shape)
     bins.places[0, 0] = below_m
     known = 1
     for level in range(len(LEVELS)):
@@ -189,26 +208,26 @@ def _look(post_m, track, height_m, below_m, bins, begin):  # type: ignore[no-unt
             guess[j] = coarse[min(j + 2 >> 2, coarse.size - 1)]  # the nearest of the level before
         for j in range(size):
             distance[j] = _distance(range_m[j], height_m - guess[j])
-        _heights(post_m, track, distance[:size], inside, bins, ground)
+        _heights(post_m, way, distance[:size], bins, ground)
         known = first + size
 
 
 @njit(cache=True, error_model="numpy")
-def _heights(post_m, track, distance, inside, bins, ground):  # type: ignore[no-untyped-def] # typed by tangents
-    """Ground at each distance along a ray, in loops as above; `inside` where no place needs to be held to the grid."""
+def _heights(post_m, way, distance, bins, ground):  # type: ignore[no-untyped-def] # typed by tangents
+    """Ground at each distance along a ray, in loops as above."""
     flat, columns = post_m.reshape(post_m.size), np.uint32(post_m.shape[1])
     size = distance.size
     south, east, post = bins.places[3][:size], bins.places[4][:size], bins.post[:size]
     upper, lower = bins.pairs[0][:size], bins.pairs[1][:size]
-    if inside:
+    if way.inside:
         for j in range(size):
-            row, column = along(track, distance[j])
-            i, k = np.int32(row), np.int32(column)
-            post[j] = np.uint32(np.uint32(i) * columns) + np.uint32(k)
+            row, column = along(way.near, distance[j])
+            i, k = np.floor(row), np.floor(column)
             south[j], east[j] = row - i, column - k
+            post[j] = np.uint32(np.uint32(np.int32(i)) * columns) + np.uint32(np.int32(k)) + way.origin
     else:
         for j in range(size):
-            row, column = along(track, distance[j])
+            row, column = along(way.track, distance[j])
             south_of, east_of, south[j], east[j] = locate(post_m, row, column)
             post[j] = np.uint32(south_of * columns) + east_of
     for j in range(size):
@@ -232,31 +251,44 @@ def stays_inside(track: Ray, far_m: float, shape: tuple[int, int]) -> bool:
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _settle(post_m, track, height_m, ground_m, range_m, tolerance):  # type: ignore[no-untyped-def] # typed by tangents
-    """The ground at one slant range, by corrections and halvings in turn: looking steeply down the former diverge."""
+    """The ground at one slant range, by corrections and halvings in turn: looking steeply down the former diverge.
+
+    NaN if it is not found, as where a void begins between the places that are too near and those that are too far.
+    """
     near, far = 0.0, range_m
     s = _distance(range_m, height_m - ground_m)
     for look in range(MOST_LOOKS):
         r, c = along(track, s)
         ground_m = bilinear(post_m, r, c)
         found = _distance(range_m, height_m - ground_m)
-        if not abs(found - s) > tolerance:
-            break
+        if abs(found - s) <= tolerance:
+            return ground_m
         near, far = (s, far) if found > s else (near, s)
         s = found if near < found < far and look % 2 == 0 else (near + far) / 2
-    return ground_m
+    return math.nan
 
 
 @njit(cache=True)
-def _distance(range_m: float, depth_m: float) -> float:
+def _distance(range_m: Real, depth_m: Real) -> Real:
     """The horizontal side of the triangle of a slant range and a height difference; 0 if there is none."""
     s2 = range_m**2 - depth_m**2
-    return math.sqrt(s2 if s2 > 0 else 0.0)
+    return math.sqrt(s2 if s2 > ZERO else ZERO)
 
 
 @njit(cache=True)
-def _lowered(tangent: float, drop_rad: float) -> float:
+def _lowered(tangent: Real, drop_rad: Real) -> Real:
     """The tangent of an elevation less the small angle by which the Earth's curvature turns the chord."""
-    return tangent - drop_rad * (1 + tangent**2)
+    return tangent - drop_rad * (ONE + tangent**2)
+
+
+@njit(cache=True)
+def _way(r, far_m, shape):  # type: ignore[no-untyped-def] # typed by tangents
+    i, k = math.floor(r.lat0), math.floor(r.lon0)
+    near = Ray(
+        single(r.lat0 - i), single(r.lat1), single(r.lat2), single(r.lat3), single(r.lat4), single(r.lat5),
+        single(r.lon0 - k), single(r.lon1), single(r.lon2), single(r.lon3), single(r.lon4), single(r.lon5),
+    )  # fmt: skip
+    return Way(r, stays_inside(r, far_m, shape), np.uint32(i * shape[1] + k), near)
 
 
 @njit(cache=True)

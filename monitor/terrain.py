@@ -8,7 +8,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numba import njit
@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from monitor.ceiling import ceilings
 from monitor.geodesy import curvature_radii
 from monitor.terrain_files import Part, TerrainError, TerrainFiles
+
+Real = Any  # of single or double precision
 
 WHOLE_POSTS = 40_000_000  # 160 MB; up to here files are held as a whole
 KEPT_POSTS = 100_000_000  # 400 MB of pieces that are kept beside the newest
@@ -209,7 +211,8 @@ def bilinear(height_m: NDArray[np.float32], row: float, column: float) -> float:
     """Bilinear height in metres at a place in posts; NaN where one of the four is void or the place is outside."""
     i, j, south, east = locate(height_m, row, column)
     columns = np.uint32(height_m.shape[1])
-    return blend(*corners(height_m.reshape(height_m.size), np.uint32(i * columns) + j, columns), south, east)
+    height: float = blend(*corners(height_m.reshape(height_m.size), np.uint32(i * columns) + j, columns), south, east)
+    return height
 
 
 @njit(cache=True)
@@ -238,12 +241,11 @@ def corners(flat_m: NDArray[np.float32], k: np.uint32, columns: np.uint32) -> tu
 
 
 @njit(cache=True)
-def blend(upper_m: np.complex64, lower_m: np.complex64, south: float, east: float) -> float:
-    """Bilinear height between the four `corners` of a place, in double precision."""
-    upper, lower = np.float64(upper_m.real), np.float64(lower_m.real)
-    upper += (upper_m.imag - upper) * east
-    lower += (lower_m.imag - lower) * east
-    return float(upper + (lower - upper) * south)
+def blend(upper_m: np.complex64, lower_m: np.complex64, south: Real, east: Real) -> Real:
+    """Bilinear height between the four `corners` of a place, in the place's precision."""
+    upper = upper_m.real + (upper_m.imag - upper_m.real) * east
+    lower = lower_m.real + (lower_m.imag - lower_m.real) * east
+    return upper + (lower - upper) * south
 
 
 @njit(cache=True)

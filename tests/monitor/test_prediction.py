@@ -15,6 +15,7 @@ from tests.monitor.ground import COLUMNS, LATITUDE, LONGITUDE, distance_m, looki
 
 FLAT = Beam(azimuth_fan=1, refraction_k=inf)
 BIN_M = 18520 / 512
+SINGLE = 2.0**-23  # the tangents are of single precision, and two roundings from the exact ones
 STEEPEST_DEG = 30.0  # a tilt of -16 degrees, the lowest that ARINC 708 can say, and half of the widest beam
 
 
@@ -148,7 +149,7 @@ def test_a_bin_is_found_though_its_first_guess_lies_beyond_the_last_post() -> No
     assert np.sqrt(range_m**2 - 500**2) == pytest.approx(ground_m, abs=1)
     delta = np.empty(1)
     assert not tangents(grid, LATITUDE, LONGITUDE, 500.0, 0.0, bins_at(np.array([range_m])), inf, -inf, delta)
-    assert delta[0] == pytest.approx(-500 / np.sqrt(range_m**2 - 500**2), rel=1e-12)
+    assert delta[0] == pytest.approx(-500 / np.sqrt(range_m**2 - 500**2), rel=SINGLE)
     assert tangents(grid, LATITUDE, LONGITUDE, 500.0, 0.0, bins_at(np.array([range_m + 15])), inf, -inf, delta)
 
 
@@ -164,7 +165,7 @@ def test_slant_ranges_over_a_plain_give_the_tangent_of_a_right_angled_triangle()
     ranges_m = np.array([500.0, 1300.0, 5000.0, 13_000.0])
     expected = -500 / np.sqrt(ranges_m[1:] ** 2 - 500**2)  # 1300 : 500 : 1200
     assert expected[0] == pytest.approx(-5 / 12)
-    np.testing.assert_allclose(look(plain(), 500.0, ranges_m[1:], inf), expected, rtol=1e-12)
+    np.testing.assert_allclose(look(plain(), 500.0, ranges_m[1:], inf), expected, rtol=SINGLE)
 
 
 def test_bins_nearer_than_the_ground_below_stay_dark() -> None:
@@ -276,6 +277,16 @@ def test_a_void_post_on_the_way_rejects_the_radial() -> None:
     assert not void.any()
     _, void = predict(grid, pointing._replace(azimuth_rad=np.zeros(2)), 512, BIN_M, FLAT)
     assert void.all()
+
+
+@pytest.mark.parametrize("height_m", [500.0, 3000.0])
+def test_a_single_row_of_voids_rejects_the_radial_wherever_it_lies(height_m: float) -> None:
+    beneath_m = height_m / np.tan(radians(STEEPEST_DEG))
+    for row in range(600, int(1185 - beneath_m / 30)):
+        grid = plain()
+        grid.height_m[row] = np.nan
+        _, void = predict(grid, looking_north(height_m), 512, BIN_M, FLAT)
+        assert void.tolist() == [True], row
 
 
 def test_a_radial_that_leaves_the_terrain_is_rejected_and_its_neighbour_is_not() -> None:
