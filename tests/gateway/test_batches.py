@@ -31,6 +31,7 @@ SWEEP_S = 61 * 3 / 40
 CHUNK_NS = 10_000_000
 MID_SCAN_NS = 1_500_000_000  # of the first of two
 RADAR, IRU, BEHIND, RELIEF = 0, 1, 8, 9  # channels
+GNSS_ID = 0x00B
 ADIRU = word429(0o377, {11: (0x038, 12)})
 OTHER_DATA = 0b11 << 24  # two bits, so that the parity stays right
 Change = Callable[[np.random.Generator, Packet], list[Packet]]
@@ -116,6 +117,34 @@ def has_a_twin(_: np.random.Generator, packet: Packet) -> list[Packet]:
     return iru + ([twin] if packet.time_ns > MID_SCAN_NS else [])
 
 
+def has_an_announced_twin(_: np.random.Generator, packet: Packet) -> list[Packet]:
+    """The same two, both announced; the IRU begins in mid-scan, is asked for, and the other begins behind it.
+
+    So the IRU's words are used, though the other's channel has the lower number.
+    """
+    if packet.type == f.HELLO:
+        channels = hello(packet).channels
+        behind = [said._replace(channel=BEHIND) for said in channels if said.channel == IRU]
+        twins = [said._replace(equipment_id=0x038) if said.channel == IRU else said for said in channels]
+        return [announcing(packet, [*twins, *behind])]
+    if packet.type != f.WORDS_429 or packet.channel != IRU:
+        return [packet]
+    entries = np.frombuffer(packet.body, "<u4").reshape(-1, 2).copy()
+    entries[:, 1] ^= OTHER_DATA
+    iru = [packet._replace(channel=BEHIND)] if packet.time_ns > MID_SCAN_NS else []
+    return iru + ([packet._replace(body=entries.tobytes())] if packet.time_ns > 2 * MID_SCAN_NS else [])
+
+
+def becomes_another(_: np.random.Generator, packet: Packet) -> list[Packet]:
+    """In the second scan the bridge says that the IRU's channel is a GNSS receiver's; there is one already."""
+    if packet.type != f.HEARTBEAT or packet.time_ns < 2 * SWEEP_S * SECOND_NS - 2 * SECOND_NS:
+        return [packet]
+    said = hello(flight()[0]).channels
+    channels = [other._replace(equipment_id=GNSS_ID) if other.channel == IRU else other for other in said]
+    again = packet._replace(type=f.HELLO, channel=0, body=racklink.hello(1, 1, [*channels]))
+    return [again, packet]
+
+
 def as_it_is(_: np.random.Generator, packet: Packet) -> list[Packet]:
     return [packet]
 
@@ -132,6 +161,8 @@ CHANGES: list[Change] = [
     says_what_it_is,
     is_relieved,
     has_a_twin,
+    has_an_announced_twin,
+    becomes_another,
 ]
 
 
