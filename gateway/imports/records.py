@@ -44,7 +44,11 @@ class Clock:
 
 
 class Records:
-    """Makes records of pieces. Each adapter's bytes of a short while are one chunk with the time of its last piece."""
+    """Makes records of pieces. Each adapter's bytes of a short while are one chunk with the time of its last piece.
+
+    A piece behind a pause, or the first of all, is a chunk of its own: its stamp is then its own time, so that the
+    clock of the adapter is laid beside the others without a delay.
+    """
 
     def __init__(
         self, adapters: Sequence[str], start_utc_ns: int, *, stamped: bool = False, chunk_ns: int = CHUNK_NS
@@ -57,7 +61,7 @@ class Records:
         self._longest_ns = chunk_ns
         self._number = count()
         self._chunks: dict[str, bytearray] = {}
-        self._last_ns: dict[str, int] = {}  # of each chunk
+        self._last_ns: dict[str, int] = {}  # of each adapter's pieces
         self._chunk_ns = 0  # when the oldest of them began
         self._tick_ns = SECOND_NS  # of the next tick
 
@@ -93,10 +97,12 @@ class Records:
         if piece.data:
             if not self._chunks:
                 self._chunk_ns = now_ns
+            before_ns = self._last_ns.get(piece.adapter)
+            resumes = before_ns is None or now_ns - before_ns > self._longest_ns
             self._last_ns[piece.adapter] = now_ns
             chunk = self._chunks.setdefault(piece.adapter, bytearray())
             chunk += (now_ns.to_bytes(8, "little") if self._stamped else b"") + piece.data
-            if len(chunk) >= CHUNK_BYTES:
+            if resumes or len(chunk) >= CHUNK_BYTES:
                 yield from self._flush()
         if piece.note:
             yield from self._flush()

@@ -52,9 +52,9 @@ def rack(tmp_path: Path) -> Path:
 
 
 def figures(found: list[Event]) -> list[tuple[object, ...]]:
-    """What scans and verdicts say, apart from when, from reasons and from the sizes of disparities."""
+    """What scans and verdicts say, apart from when and from reasons."""
     scans = [(e.scan, e.radials, e.sector, e.range_nm, e.tilt_deg, e.gaps) for e in only(ScanEvent, found)]
-    verdicts = [(e.scan, e.n_pairs, e.verdict, e.threshold) for e in only(IntegrityEvent, found)]
+    verdicts = [(e.scan, e.n_pairs, e.t_bins2, e.q, e.verdict, e.threshold) for e in only(IntegrityEvent, found)]
     return [*scans, *verdicts]
 
 
@@ -73,12 +73,6 @@ def test_ballard_and_max_technologies_files_give_the_same_verdicts(
     assert figures(first) == figures(second)
     told = only(IntegrityEvent, first)
     assert len(told) == 3
-    # One adapter's clock is matched to the chunks of one file, those of four to four: the aircraft is centimetres
-    # elsewhere at most, and a bin on the brink may be lit in one and dark in the other.
-    sizes = [
-        [x for e in some for x in (e.t_bins2, e.q) if x is not None] for some in (told, only(IntegrityEvent, second))
-    ]
-    assert sizes[0] == pytest.approx(sizes[1], rel=0.05)
     assert min(verdict.n_pairs for verdict in told[:2]) > 20
     assert [scan.gaps for scan in only(ScanEvent, first)[:2]] == [0, 0]
     assert only(StateEvent, first)[-1].validity["latitude_deg"] == "NORMAL"
@@ -124,8 +118,9 @@ def test_stamps_never_go_back_whatever_the_card_s_clock_does(tmp_path: Path) -> 
     stream = b"".join(seqrecord((4, 0, pitch_word(1.0)), time_us) for time_us in times_us)
     out = imported(tmp_path, "seqrecord", stream, channels=channels_of(["4=arinc429:iru_704"]))
     stamps_us = [record.stamp.monotonic_ns // 1000 for record in raw_records(out)]
-    # 5.3 s waits for 5.5 s; the clock begins anew at 0, leaps to the end of time and comes back
-    assert stamps_us == [0, 500_000, 600_000, 700_000]
+    # 5.3 s waits for 5.5 s; the clock begins anew at 0, leaps to the end of time and comes back; what comes behind a
+    # pause is a chunk of its own
+    assert stamps_us == [0, 500_000, 500_000, 600_000, 600_000, 700_000, 700_000]
     assert recorded_bytes(out, "seqrecord") == stream
     assert summary(out)["clock_restarts"] > 0
 
