@@ -5,6 +5,8 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
+from monitor.verdict import Verdict
+
 
 @dataclass(frozen=True)
 class Event:
@@ -55,36 +57,13 @@ class StateEvent(Event):
     age_s: dict[str, float | None]
 
 
-@dataclass(frozen=True)
-class IntegrityEvent(Event):
-    """The verdict on one scan."""
+@dataclass(frozen=True, kw_only=True)
+class IntegrityEvent(Verdict, Event):
+    """The verdict on one scan, and by which method and at which probability of a false alert it was found."""
 
     type: ClassVar[str] = "integrity"
-    scan: int
     method: str
-    n_pairs: int
-    scans: int
-    t_bins2: float | None
-    t_normalised: float | None
-    q: float | None
-    threshold: float | None
     p_fa: float
-    mean_bins: float | None
-    mean_stderr_bins: float | None
-    shift: float | None
-    shift_limit: float | None
-    unmatched_radar: float | None
-    unmatched_radar_limit: float | None
-    unmatched_dem: float | None
-    unmatched_dem_limit: float | None
-    level: float | None
-    mdb_bins: float | None
-    calibration: str
-    offset_north_m: float | None
-    offset_east_m: float | None
-    offset_confidence: float | None
-    verdict: str
-    reasons: tuple[str, ...]
 
 
 @dataclass(frozen=True)
