@@ -50,7 +50,7 @@ def section() -> list[str]:
         f"| its start alone | {1e3 * start_s:.0f} | |",
         f"| the call over the thread | {ratio:.0f} times | {TIMES_QUICKER}: {_word(ratio >= TIMES_QUICKER)} |",
         f"| without its start | {net:.1f} times | {TIMES_QUICKER_NET}: {_word(net >= TIMES_QUICKER_NET)} |",
-        f"| the same on nothing but the ground in range | {in_range:.1f} times | none |",
+        f"| the same on nothing but the ground in range | {_times(in_range)} | none |",
     ]
 
 
@@ -92,3 +92,7 @@ def _of_children() -> float:
 
 def _word(good: bool) -> str:
     return "holds" if good else "FAILS"
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.1f} times" if ratio > 0 else "less than its start varies by"

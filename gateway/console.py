@@ -38,6 +38,9 @@ def describe(event: Event) -> str:
         figures = f"N {event.n_pairs}  T {event.t_bins2:.1f} bins2  {decides} against {event.threshold:.1f}"
         if event.shift is not None and event.shift_limit is not None:
             figures += f"  S {event.shift:.1f} against {event.shift_limit:.1f}"
+        if event.offset_north_m is not None and event.offset_east_m is not None:
+            place = f"{event.offset_north_m:+.0f} m north, {event.offset_east_m:+.0f} m east"
+            figures += f"  off by {place} ({event.offset_confidence:.0%})"
         return f"scan {event.scan}: {event.verdict.upper()}  {figures}  {reasons}"
     if isinstance(event, SummaryEvent):
         return "summary: " + ", ".join(f"{name} {count}" for name, count in event.counters.items() if count)

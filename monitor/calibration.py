@@ -2,19 +2,24 @@
 
 from functools import cache
 from pathlib import Path
+from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from monitor.settings import MonitorSettings
 
 CLIP_FACTOR = 2.0
+NO_CALIBRATION = "none"
+MOST_BINS = 256  # half of the usual radar's: nothing that pairs is farther apart when nothing is wrong
 
 
 class CheckedRate(BaseModel):
     """What a configured P_FA came to, with all tests, on scans that the fit had not seen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-    p_fa: float
-    scans: int
-    alerts: int
+    p_fa: float = Field(gt=0, lt=1)
+    scans: int = Field(ge=0)
+    alerts: int = Field(ge=0)
 
 
 class UnmatchedModel(BaseModel):
@@ -38,46 +43,70 @@ class CommonErrors(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-    place_bins: float = Field(ge=0)
-    stretch: float = Field(ge=0)
+    place_bins: float = Field(ge=0, le=MOST_BINS)
+    stretch: float = Field(ge=0, le=10)
 
 
-class LevelLimits(BaseModel):
-    """Between which signal levels the fault-free scans lay."""
+class Limits(BaseModel):
+    """Between which values the fault-free scans lay, of their signal levels or of their heights."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     lowest: float
     highest: float
 
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.lowest > self.highest:
+            raise ValueError(f"lowest {self.lowest:g} is above highest {self.highest:g}")
+        return self
+
+    def hold(self, value: float) -> bool:
+        """Whether a value lies between them; one that is no number does not."""
+        return self.lowest <= value <= self.highest
+
 
 class Calibration(BaseModel):
-    """The file that the monitor loads; bins are range bins of the radar it was measured with."""
+    """The file that the monitor loads; bins are range bins of the radar it was measured with.
+
+    `height_m` are limits of the antenna's mean height above the ground below it; `options` the monitor's options that
+    shape disparities, as `MonitorSettings.shaping` gives them, none in files that do not say.
+    """
 
     # A NaN or an infinite sigma would make Q pass every threshold.
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-    name: str
+    name: str = Field(min_length=1)
     provenance: str
-    bins: int | None = None
-    range_nm: float | None = None
+    bins: int | None = Field(None, ge=1)
+    range_nm: float | None = Field(None, gt=0)
     radar_profile: str | None = None
-    median_bins: float
-    spread_bins: float = Field(gt=0)
+    median_bins: float = Field(ge=-MOST_BINS, le=MOST_BINS)
+    spread_bins: float = Field(gt=0, le=MOST_BINS)
     sigma_bins: float = Field(gt=0)
     rms_bins: float = Field(gt=0)
-    variance_factor: float = Field(ge=1)
+    variance_factor: float = Field(ge=1, le=1000)
     common: CommonErrors | None = None
     unmatched_radar: UnmatchedModel | None = None
     unmatched_dem: UnmatchedModel | None = None
-    level: LevelLimits | None = None
+    level: Limits | None = None
+    height_m: Limits | None = None
+    options: dict[str, str] = {}
     checked: tuple[CheckedRate, ...] = ()
+
+    @model_validator(mode="after")
+    def _some_disparity_stands_out(self) -> Self:
+        if self.sigma_bins > self.clip_bins:  # of what is clipped
+            raise ValueError(
+                f"sigma_bins {self.sigma_bins:g} is above {CLIP_FACTOR:g} spread_bins, where it is clipped"
+            )
+        return self
 
     @property
     def clip_bins(self) -> float:
         """The largest deviation from the median that counts in full."""
         return CLIP_FACTOR * self.spread_bins
 
-    def mismatch(self, bins: int, range_nm: float, profile: str) -> str | None:
-        """Why the calibration does not hold for a scan, or None. Of a profile "" nothing is known."""
+    def mismatch(self, bins: int, range_nm: float, profile: str, settings: MonitorSettings) -> str | None:
+        """Why the calibration does not hold for a scan and a monitor, or None. Of a profile "" nothing is known."""
         if self.bins not in (None, bins):
             return f"calibration {self.name} is for {self.bins} range bins, the radar sends {bins}: {MEND}"
         if self.range_nm not in (None, range_nm):
@@ -87,10 +116,13 @@ class Calibration(BaseModel):
             )
         if profile and self.radar_profile not in (None, profile):
             return f"calibration {self.name} is for radar profile {self.radar_profile}, this one is {profile}: {MEND}"
+        for name, ours in settings.shaping.items():
+            theirs = self.options.get(name, ours)
+            if theirs != ours:
+                return f"calibration {self.name} was made with {name} {theirs}, the monitor has {ours}: {MEND}"
         return None
 
 
-NO_CALIBRATION = "none"
 MEND = "load one that was made for it, or none"
 
 _DEFAULTS = Calibration(
@@ -119,7 +151,7 @@ def uncalibrated(bins: int) -> Calibration:
 def load_calibration(path: Path) -> Calibration:
     """Read a calibration file. Raises ValueError naming the file and what is wrong in it."""
     try:
-        return Calibration.model_validate_json(path.read_bytes())
+        found = Calibration.model_validate_json(path.read_bytes())
     except OSError as error:
         raise ValueError(f"calibration file {path} cannot be read: {error.strerror}") from error
     except ValidationError as error:
@@ -127,3 +159,6 @@ def load_calibration(path: Path) -> Calibration:
         place = ".".join(str(part) for part in first["loc"]) or "the file"
         mend = "if another version made it, make it anew with shadebus calibrate radar"
         raise ValueError(f"calibration file {path}: {place}: {first['msg']}; {mend}") from error
+    if found.name == NO_CALIBRATION:
+        raise ValueError(f"calibration file {path}: its name is {NO_CALIBRATION!r}, as if there were none: rename it")
+    return found

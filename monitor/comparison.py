@@ -1,5 +1,6 @@
 """Both threads of one scan side by side: what the radar saw, what the stored terrain predicts, and the pairs."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
@@ -25,6 +26,7 @@ class Comparison:
 
     Centres of shadows are in range bins; `pair_radial` is the index of a pair's radial among those in use,
     `pair_azimuth_rad` that radial's true azimuth, and `pair_size` how many bins the pair's terrain shadow has.
+    `height_m` is the mean height of the antenna above the ground below it.
     """
 
     scan_angle_deg: NDArray[np.float64]
@@ -37,6 +39,7 @@ class Comparison:
     dem_centre: NDArray[np.float64]
     unmatched_radar: Unmatched
     unmatched_dem: Unmatched
+    height_m: float
 
     @property
     def disparities(self) -> NDArray[np.float64]:
@@ -46,7 +49,7 @@ class Comparison:
     def sample(self, scan: Scan) -> ScanSample:
         """What the tests look at, of the scan that was compared."""
         pairs = self.disparities, self.pair_azimuth_rad, self.pair_size
-        return ScanSample(*pairs, self.unmatched_radar, self.unmatched_dem, signal_level(scan.bins))
+        return ScanSample(*pairs, self.unmatched_radar, self.unmatched_dem, signal_level(scan.bins), self.height_m)
 
 
 def compare(
@@ -89,7 +92,15 @@ def compare(
         foreseen["centre"][pairs["dem"]],
         Unmatched(*unmatched_share(counted[counted["size"] >= s.unmatched_size], every_predicted, dem)),
         Unmatched(*unmatched_share(expected[expected["size"] >= s.unmatched_size], every_seen, radar)),
+        _height_over_ground_m(pointing, terrain),
     ), [*lost, *counts.reasons]
+
+
+def _height_over_ground_m(pointing: Pointing, terrain: Terrain) -> float:
+    """The mean over the radials below which the ground is known, NaN without one."""
+    height_m = pointing.height_m - terrain.elevation(pointing.latitude_deg, pointing.longitude_deg)
+    known = height_m[np.isfinite(height_m)]
+    return float(known.mean()) if known.size else math.nan
 
 
 def thin(scan_angle_deg: NDArray[np.float64], spacing_deg: float) -> NDArray[np.intp]:
@@ -97,8 +108,10 @@ def thin(scan_angle_deg: NDArray[np.float64], spacing_deg: float) -> NDArray[np.
 
     Neighbours within a beam see the same shadow: counted as independent they turn a P_FA of 1e-3 into 0.04.
     """
+    around = np.floor(360 / spacing_deg)  # cells of a full circle, whose first and last are one
     cell = np.round(scan_angle_deg / spacing_deg)
-    order = np.lexsort((np.abs(scan_angle_deg - cell * spacing_deg), cell))
+    off_deg, cell = np.abs(scan_angle_deg - cell * spacing_deg), cell % around
+    order = np.lexsort((off_deg, cell))
     nearest = np.ones(len(order), np.bool_)
     np.not_equal(cell[order[1:]], cell[order[:-1]], out=nearest[1:])
     return np.sort(order[nearest])

@@ -22,6 +22,7 @@ from monitor.settings import MonitorSettings
 from monitor.shift import score, shift_statistic, shift_threshold
 
 LEAST_RHO = 1e-6  # which is a binomial
+DIRECTIONS = 8  # of a half circle, in which a shift is tried
 MOST_PAIRS = 1000  # beyond, no further ones would make Q see
 RADAR_SHARE, DEM_SHARE = "the unmatched share of radar shadows", "the unmatched share of terrain shadows"
 
@@ -89,8 +90,9 @@ def examine(
     if settings.method == "robust":
         test = Test("Q", q, robust_threshold(len(d), p_fa.statistic, c.variance_factor))
         most = _most(len(d), c)
-        if most <= test.limit and shift is None:
+        if most <= test.limit and not (shift and _sees_shifts(sample, c, shift.limit)):
             blind = f"Q reaches {most:.1f} at most, its threshold is {test.limit:.1f}"
+            blind += ", and no shift would be found" if shift else ""
             return Findings(None, f"{len(d)} pairs cannot alert at P_FA {settings.p_fa:g}: {blind}", None, radar, dem)
     else:
         test = Test("N T / sigma^2", t, threshold(len(d), p_fa.statistic))
@@ -145,9 +147,11 @@ def _holds(model: UnmatchedModel | None, settings: MonitorSettings) -> bool:
 
 def untested(settings: MonitorSettings, calibration: Calibration) -> list[str]:
     """What a calibration does not allow to be tested although the settings would have it, and why."""
-    if settings.method == "paper":
-        return []
     name, found = calibration.name, []
+    if unsaid := [what for what in ("bins", "range_nm", "radar_profile") if getattr(calibration, what) is None]:
+        found.append(f"calibration {name} does not say for which {', '.join(unsaid)} it holds: it is taken for any")
+    if settings.method == "paper":
+        return found
     if calibration.common is None and settings.shift_budget:
         found.append(f"shifts are not tested: calibration {name} has no errors in common, make it anew")
     model = calibration.unmatched_dem
@@ -182,6 +186,18 @@ def shift_test(sample: ScanSample, c: Calibration, p_fa: float) -> Test | None:
         return None
     found = shift_statistic(score(sample, c.median_bins, c.clip_bins), c.sigma_bins, c.common)
     return Test("the shift statistic", found, shift_threshold(p_fa))
+
+
+def _sees_shifts(sample: ScanSample, c: Calibration, limit: float) -> bool:
+    """Whether the shift statistic exceeds its limit for any shift, however large: its disparities are clipped."""
+    if c.common is None:
+        return False
+    for toward in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:
+        d = c.median_bins + c.clip_bins * np.sign(np.cos(sample.azimuth_rad - toward))
+        found = score(sample._replace(disparities=d), c.median_bins, c.clip_bins)
+        if shift_statistic(found, c.sigma_bins, c.common) > limit:
+            return True
+    return False
 
 
 def unmatched_test(name: str, found: Unmatched, model: UnmatchedModel | None, p_fa: float) -> Test | None:

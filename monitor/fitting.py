@@ -6,13 +6,13 @@ c = E[(Q - N)^2] / E[2 N], which is 1 for independent normal disparities and gro
 of those comes of a wrong position or height is measured apart, for the test for a shift.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from monitor.calibration import CLIP_FACTOR, Calibration, CheckedRate, LevelLimits, UnmatchedModel
+from monitor.calibration import CLIP_FACTOR, Calibration, CheckedRate, Limits, UnmatchedModel
 from monitor.decision import examine
 from monitor.disparity import clipped, robust_statistic
 from monitor.sample import ScanSample, Unmatched
@@ -20,7 +20,7 @@ from monitor.settings import MonitorSettings
 from monitor.shift import common_errors, score
 
 QUARTILE = float(ndtri(0.75))  # of a normal distribution: half of it lies nearer to its median
-LEVELS_LEFT_OUT = 0.5  # percent of the scans at either end
+LEFT_OUT = 0.5  # percent of the scans at either end of the limits
 
 
 def fit(
@@ -68,7 +68,9 @@ def fit(
         common=common_errors([score(scan, median, clip) for scan in usable], sigma),
         unmatched_radar=_shares([scan.unmatched_radar for scan in usable], settings),
         unmatched_dem=_shares([scan.unmatched_dem for scan in usable], settings),
-        level=_levels(np.array([scan.level for scan in usable])),
+        level=_limits([scan.level for scan in usable]),
+        height_m=_limits([scan.height_m for scan in usable]),
+        options=settings.shaping,
     )
     held_out = [scan for scan in check if len(scan.disparities) >= minimum_pairs]
     return made.model_copy(update={"checked": tuple(_checked(held_out, made, settings, p_fa) for p_fa in p_fas)})
@@ -92,9 +94,9 @@ def _shares(found: Sequence[Unmatched], settings: MonitorSettings) -> UnmatchedM
     return UnmatchedModel(mean=mean, overdispersion=rho, least_size=settings.unmatched_size)
 
 
-def _levels(levels: NDArray[np.float64]) -> LevelLimits | None:
-    known = levels[~np.isnan(levels)]
-    if not known.size:
+def _limits(values: Sequence[float]) -> Limits | None:
+    known = [value for value in values if not math.isnan(value)]
+    if not known:
         return None
-    lowest, highest = np.percentile(known, [LEVELS_LEFT_OUT, 100 - LEVELS_LEFT_OUT])
-    return LevelLimits(lowest=float(lowest), highest=float(highest))
+    lowest, highest = np.percentile(known, [LEFT_OUT, 100 - LEFT_OUT])
+    return Limits(lowest=float(lowest), highest=float(highest))

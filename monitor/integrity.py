@@ -91,12 +91,13 @@ class Monitor:
         ground_m = here.elevation(pointing.latitude_deg, pointing.longitude_deg)
         screens, told = self._screens(scan, pointing, height_m, water)
         comparison, left_out = compare(scan, chosen, pointing, here, self.settings, screens)
-        reasons += [*told, *left_out, *uncovered(ground_m, self.terrain.extent, pointing)]
+        reasons += [*told, *left_out]
+        doubts = [*uncovered(ground_m, self.terrain.extent, pointing), *_buried(ground_m, pointing)]
         if self.settings.tracked_scans > 1:
             every, known, _ = point(scan, aircraft, steady, self.settings)
             fronts = fronts_of(scan, steady[known], every, here.grid, self.settings)
             self._tracker.add(int(scan.time_ns[-1]), fronts)
-        verdict, of_itself = self._decide(scan, comparison, _buried(ground_m, pointing), reasons)
+        verdict, of_itself = self._decide(scan, comparison, doubts, reasons)
         if of_itself and self.settings.offset_search_m:
             calibration = self.calibration or uncalibrated(scan.bins.shape[1])
             search = Search(scan, chosen, pointing, here, self.settings, calibration, screens)
@@ -120,8 +121,8 @@ class Monitor:
             return f"radar reports faults: bits {scan.faults:07b} of the header's 18 to 24, the first at the right"
         if bits := misread_bits(scan.bins):
             return f"the range bins look like {bits} bits each: check radar_profile, or the channel's profile"
-        calibration = self.calibration
-        return calibration.mismatch(scan.bins.shape[1], scan.range_nm, scan.profile) if calibration else None
+        c = self.calibration
+        return c.mismatch(scan.bins.shape[1], scan.range_nm, scan.profile, self.settings) if c else None
 
     def _reach_m(self, scan: Scan) -> float:
         """How far from the radials in use the terrain of a scan may be looked at, moved about and on all radials."""
@@ -166,7 +167,8 @@ class Monitor:
             first = self._contradictions(sample, pairs, findings)
             verdict = UNAVAILABLE if first or doubts or unlike else OK
         gathered = [f"pairs of the last {scans} scans together"] if scans > 1 else []
-        because = [*unlike, *first, *doubts, *gathered, *reasons]
+        because = [*unlike, *first, *doubts] if findings.alerts else [*doubts, *unlike, *first]  # the cause goes first
+        because += [*gathered, *reasons]
         told = self._told(scan.number, verdict, because, sample, pairs, findings, scans)
         return told, verdict == told.verdict == ALERT and scans == 1
 
@@ -210,11 +212,17 @@ class Monitor:
     def _unlike_calibration(self, sample: ScanSample) -> list[str]:
         """What makes the calibration, and with it every probability, worthless for a scan."""
         c = self.calibration
-        if c is None or c.level is None or c.level.lowest <= sample.level <= c.level.highest:
-            return []
-        found = "nothing is lit" if math.isnan(sample.level) else f"the mean level is {sample.level:.2f}"
-        levels = f"{c.level.lowest:.2f} to {c.level.highest:.2f}"
-        return [f"{found} in the farther half, where calibration {c.name} has {levels}: check the radar's gain"]
+        unlike = []
+        if c and c.level and not c.level.hold(sample.level):
+            found = "nothing is lit" if math.isnan(sample.level) else f"the mean level is {sample.level:.2f}"
+            levels = f"{c.level.lowest:.2f} to {c.level.highest:.2f}"
+            mend = "check the radar's gain"
+            unlike.append(f"{found} in the farther half, where calibration {c.name} has {levels}: {mend}")
+        if c and c.height_m and not math.isnan(sample.height_m) and not c.height_m.hold(sample.height_m):
+            heights = f"{c.height_m.lowest:.0f} to {c.height_m.highest:.0f} m"
+            mend = "calibrate at the heights that are flown"
+            unlike.append(f"{sample.height_m:.0f} m above ground, where calibration {c.name} has {heights}: {mend}")
+        return unlike
 
     def _contradictions(self, sample: ScanSample, pairs: NDArray[np.float64], findings: Findings) -> list[str]:
         """What forbids an ok that rests on stated defaults: they may be too wide for this radar, and hide an error."""

@@ -1,5 +1,6 @@
 """What the tests of the monitor look at, of one scan."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,8 @@ class Unmatched(NamedTuple):
 
 class ScanSample(NamedTuple):
     """Disparities (N,) of eq. (6) in range bins, the true azimuths (N,) of their radials and the sizes (N,) of their
-    terrain shadows in range bins; the unmatched shadows of either thread, and the signal level.
+    terrain shadows in range bins; the unmatched shadows of either thread, the signal level, and the mean height of the
+    antenna above the ground below it, metres.
     """
 
     disparities: NDArray[np.float64]
@@ -29,6 +31,7 @@ class ScanSample(NamedTuple):
     unmatched_radar: Unmatched
     unmatched_dem: Unmatched
     level: float  # of `signal_level`, NaN where nothing is lit
+    height_m: float = math.nan
 
 
 NOTHING = ScanSample(np.empty(0), np.empty(0), np.empty(0), Unmatched(0, 0), Unmatched(0, 0), float("nan"))

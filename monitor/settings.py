@@ -6,6 +6,21 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 SEARCH_STEP_M = 200.0  # shadows of mountains move together over about as far
 MOST_GIVEN = 0.95 + 1e-9  # of p_fa, to other tests than the statistic; with room for rounding
+SHAPING = (
+    "beam_width_deg",
+    "azimuth_fan",
+    "azimuth_span",
+    "refraction_k",
+    "range_reference",
+    "radial_spacing_deg",
+    "minimum_size",
+    "maximum_size",
+    "minimum_width_deg",
+    "pairing",
+    "range_limit_nm",
+    "first_bin_from_radio_altitude",
+    "tracked_scans",
+)
 HeightSource = Literal["076", "370"]
 
 
@@ -24,7 +39,7 @@ class MonitorSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     method: Literal["robust", "paper"] = Field("robust", description="which test decides: clipped Q, or T as published")
-    p_fa: float = Field(1e-4, gt=0, lt=0.5, description="probability of a false alert in one scan")
+    p_fa: float = Field(1e-4, ge=1e-12, lt=0.5, description="probability of a false alert in one scan")
     shift_budget: float = Field(0.6, ge=0, le=0.95, description="share of p_fa that goes to the test for a shift")
     unmatched_dem_budget: float = Field(
         0.35, ge=0, le=0.95, description="share of p_fa that goes to the test of unmatched terrain shadows"
@@ -124,6 +139,11 @@ class MonitorSettings(BaseModel):
         if 0 < self.offset_search_m < SEARCH_STEP_M:
             raise ValueError(f"offset_search_m {self.offset_search_m:g} is below {SEARCH_STEP_M:g}: 0 searches nothing")
         return self
+
+    @property
+    def shaping(self) -> dict[str, str]:
+        """The options on which disparities and shadows depend, in words: a calibration holds for these alone."""
+        return {name: str(getattr(self, name)) for name in SHAPING}
 
     @property
     def uses_radio_altitude(self) -> bool:

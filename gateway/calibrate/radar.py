@@ -37,7 +37,15 @@ class Material(NamedTuple):
 
 
 def material(reads: Sequence[Read]) -> Material:
-    """The scans of the commonest setting. Raises GatewayError, with what to fly, if no scan was compared."""
+    """The scans of the commonest setting.
+
+    Raises GatewayError if a recording is there twice, or, with what to fly, if no scan was compared.
+    """
+    known: dict[str, str] = {}
+    for read in reads:
+        if read.digest in known:
+            raise GatewayError(f"{known[read.digest]} and {read.name} are the same recording: name one of them")
+        known[read.digest] = read.name
     settings = Counter(scan.setting for read in reads for scan in read.scans)
     if not settings:
         refusals = sum((read.refusals for read in reads), Counter[str]())

@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -137,7 +138,16 @@ def test_recordings_without_terrain_and_files_that_are_none_are_named(tmp_path: 
 
 def made(name: str, begins_utc_ns: int, *scans: Compared, p_fa: float = 1e-4, refusals: int = 0) -> Read:
     said = Counter({"radar is in mode 1, not map": refusals} if refusals else {})
-    return Read(name, "ab" * 32, "hills", MonitorSettings(p_fa=p_fa), begins_utc_ns, "", list(scans), said)
+    return Read(
+        name,
+        hashlib.sha256(name.encode()).hexdigest(),
+        "hills",
+        MonitorSettings(p_fa=p_fa),
+        begins_utc_ns,
+        "",
+        list(scans),
+        said,
+    )
 
 
 def scan(value: float, range_nm: float = 10.0) -> Compared:
@@ -145,6 +155,13 @@ def scan(value: float, range_nm: float = 10.0) -> Compared:
     d = value + np.tile([-2.0, -1.0, 1.0, 2.0], 5)
     sample = ScanSample(d, np.zeros(len(d)), np.ones(len(d)), Unmatched(2, 10), Unmatched(2, 10), 3.0)
     return Compared(Setting(512, range_nm, "arinc708"), sample, (d,) * len(CELLS))
+
+
+def test_two_copies_of_a_recording_are_refused() -> None:
+    one = made("one", 10, scan(1))
+    copy = replace(one, name="copy")
+    with pytest.raises(GatewayError, match="one and copy are the same recording: name one of them"):
+        material([one, made("two", 20, scan(2)), copy])
 
 
 def test_the_commonest_radar_setting_is_calibrated_in_order_of_time_and_the_rest_counted() -> None:

@@ -7,14 +7,17 @@ import pytest
 from monitor.calibration import (
     Calibration,
     CheckedRate,
-    LevelLimits,
+    Limits,
     UnmatchedModel,
     load_calibration,
     uncalibrated,
 )
+from monitor.settings import MonitorSettings
+
+DEFAULTS = MonitorSettings()
 
 STORED = Calibration(
-    name="none",
+    name="bench",
     provenance="made up",
     median_bins=0.0,
     spread_bins=2.0,
@@ -28,7 +31,7 @@ WHOLE = STORED.model_copy(
         "range_nm": 10.0,
         "unmatched_radar": UnmatchedModel(mean=0.4, overdispersion=0.01),
         "unmatched_dem": UnmatchedModel(mean=0.2, overdispersion=0.0),
-        "level": LevelLimits(lowest=1.5, highest=2.5),
+        "level": Limits(lowest=1.5, highest=2.5),
         "checked": (CheckedRate(p_fa=0.1, scans=20, alerts=1),),
     }
 )
@@ -60,13 +63,21 @@ def damaged(tmp_path: Path, old: str, new: str) -> Path:
         ('"sigma_bins":2.2', '"sigma_bins":Infinity', "sigma_bins"),
         ('"median_bins":0.0', '"median_bins":NaN', "median_bins"),
         ('"variance_factor":1.4', '"variance_factor":0.9', "variance_factor"),
-        ('"name":"none",', "", "name"),
-        ('"name":"none"', '"name":"none","colour":"blue"', "colour"),
+        ('"variance_factor":1.4', '"variance_factor":1e9', "variance_factor"),
+        ('"spread_bins":2.0', '"spread_bins":1e6', "spread_bins"),
+        ('"sigma_bins":2.2', '"sigma_bins":4.1', "the file: Value error, sigma_bins 4.1 is above 2 spread_bins"),
+        ('"bins":null', '"bins":0', "bins"),
+        ('"range_nm":null', '"range_nm":-1', "range_nm"),
+        ('"level":null', '"level":{"lowest":3,"highest":1}', "level: Value error, lowest 3 is above highest 1"),
+        ('"name":"bench"', '"name":""', "name"),
+        ('"name":"bench"', '"name":"none"', "its name is 'none', as if there were none"),
+        ('"name":"bench",', "", "name"),
+        ('"name":"bench"', '"name":"bench","colour":"blue"', "colour"),
         ('"checked":[]', '"checked":[{"p_fa":0.1,"scans":3}]', r"checked\.0\.alerts"),
     ],
 )
 def test_a_fault_in_the_file_names_the_file_and_the_field(tmp_path: Path, old: str, new: str, field: str) -> None:
-    with pytest.raises(ValueError, match=rf"radar\.json: {field}: "):
+    with pytest.raises(ValueError, match=rf"radar\.json: {field}"):
         load_calibration(damaged(tmp_path, old, new))
 
 
@@ -81,19 +92,28 @@ def test_a_file_that_is_missing_or_no_json_is_named(tmp_path: Path) -> None:
 
 def test_a_calibration_says_for_which_radar_it_holds() -> None:
     made = WHOLE
-    assert made.mismatch(512, 10.0, "arinc708") is None
-    assert "calibration none is for 512 range bins, the radar sends 256" in str(made.mismatch(256, 10.0, ""))
-    assert "range of 10 NM, the radar is set to 20 NM" in str(made.mismatch(512, 20.0, ""))
+    assert made.mismatch(512, 10.0, "arinc708", DEFAULTS) is None
+    assert "calibration bench is for 512 range bins, the radar sends 256" in str(made.mismatch(256, 10.0, "", DEFAULTS))
+    assert "range of 10 NM, the radar is set to 20 NM" in str(made.mismatch(512, 20.0, "", DEFAULTS))
     profiled = made.model_copy(update={"radar_profile": "arinc708"})
-    assert profiled.mismatch(512, 10.0, "arinc708") is None
-    assert profiled.mismatch(512, 10.0, "") is None
-    said = str(profiled.mismatch(512, 10.0, "rdr4000"))
+    assert profiled.mismatch(512, 10.0, "arinc708", DEFAULTS) is None
+    assert profiled.mismatch(512, 10.0, "", DEFAULTS) is None
+    said = str(profiled.mismatch(512, 10.0, "rdr4000", DEFAULTS))
     assert "is for radar profile arinc708, this one is rdr4000: load one that was made for it" in said
+
+
+def test_a_calibration_made_with_other_options_does_not_hold() -> None:
+    made = WHOLE.model_copy(update={"options": DEFAULTS.shaping})
+    assert made.mismatch(512, 10.0, "", DEFAULTS) is None
+    assert made.mismatch(512, 10.0, "", DEFAULTS.model_copy(update={"p_fa": 1e-3})) is None
+    said = made.mismatch(512, 10.0, "", DEFAULTS.model_copy(update={"azimuth_fan": 1}))
+    assert said is not None
+    assert said.startswith("calibration bench was made with azimuth_fan 7, the monitor has 1: load one")
 
 
 def test_the_stated_defaults_are_the_same_share_of_the_range_setting_for_any_number_of_bins() -> None:
     fine, coarse = uncalibrated(512), uncalibrated(256)
-    assert coarse.mismatch(256, 20.0, "") is None
+    assert coarse.mismatch(256, 20.0, "", DEFAULTS) is None
     for name in ("spread_bins", "sigma_bins", "rms_bins", "clip_bins"):
         assert getattr(fine, name) == 2 * getattr(coarse, name)
     assert fine.variance_factor == coarse.variance_factor

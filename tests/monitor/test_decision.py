@@ -13,6 +13,9 @@ MODEL = UnmatchedModel(mean=0.3, overdispersion=0.02, least_size=8)
 CALIBRATION = Calibration(
     name="made",
     provenance="made up",
+    bins=512,
+    range_nm=10.0,
+    radar_profile="arinc708",
     median_bins=0.0,
     spread_bins=2.0,
     sigma_bins=2.0,
@@ -124,6 +127,25 @@ def test_a_calibration_without_what_a_test_needs_leaves_its_share_to_q_and_says_
     assert "of 8 bins and more are not tested: calibration made has those of 3 bins and more" in unmatched
     assert not untested(settings, CALIBRATION)
     assert not untested(settings.model_copy(update={"method": "paper"}), old)
+
+
+def test_a_calibration_that_does_not_say_for_which_radar_it_holds_is_named() -> None:
+    (said,) = untested(MonitorSettings(), CALIBRATION.model_copy(update={"bins": None, "range_nm": None}))
+    assert said == "calibration made does not say for which bins, range_nm it holds: it is taken for any"
+
+
+def test_where_neither_q_nor_the_shift_statistic_could_alert_nothing_is_ok() -> None:
+    """Common errors of the position as large as these hide any shift, and 20 clipped pairs Q at such a P_FA."""
+    exact, wide = (
+        CALIBRATION.model_copy(update={"common": CommonErrors(place_bins=place_bins, stretch=0.0)})
+        for place_bins in (0.0, 60.0)
+    )
+    settings = MonitorSettings(p_fa=1e-9, unmatched_dem_budget=0.0)
+    assert examine(sample(n=20), settings, exact).statistic is not None
+    blind = examine(sample(n=20), settings, wide)
+    assert blind.statistic is None
+    assert "20 pairs cannot alert" in blind.blind
+    assert "no shift would be found" in blind.blind
 
 
 def test_a_window_lends_pairs_to_the_statistic_and_to_no_other_test() -> None:

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import betabinom, binom, norm
 
-from monitor.calibration import CLIP_FACTOR, Calibration, LevelLimits
+from monitor.calibration import CLIP_FACTOR, Calibration, Limits
 from monitor.fitting import fit
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
@@ -144,4 +144,4 @@ def test_shares_of_a_binomial_have_no_overdispersion() -> None:
 def test_levels_are_limited_by_the_scans_but_half_a_percent_at_either_end() -> None:
     levels = np.r_[np.arange(201.0), np.nan]
     found = fitted_to_shares(np.full(202, 3), 10, levels)
-    assert found.level == LevelLimits(lowest=1.0, highest=199.0)
+    assert found.level == Limits(lowest=1.0, highest=199.0)

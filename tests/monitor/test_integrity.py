@@ -176,6 +176,7 @@ def test_thinning_takes_the_radial_nearest_to_each_multiple_of_the_spacing() -> 
     assert thin(angles, 0.01).tolist() == list(range(9))
     assert not thin(np.empty(0), 3.0).size
     assert thin(np.full(50, 12.0), 3.0).tolist() == [0]
+    assert len(thin(np.arange(-180.0, 180.0), 3.0)) == 120, "179 and -180 are neighbours"
 
 
 def test_the_lever_arm_puts_the_antenna_where_it_is(white_mountains: Terrain, honest: Scan) -> None:

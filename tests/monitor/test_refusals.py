@@ -8,6 +8,7 @@ from pyproj import Geod
 
 from decoders.formats import MODES_708
 from monitor.aircraft import Aircraft
+from monitor.calibration import Limits
 from monitor.integrity import Monitor
 from monitor.pointing import NEEDED
 from monitor.prediction import Beam
@@ -161,6 +162,19 @@ def test_an_aircraft_outside_the_stored_terrain_is_named_with_what_the_files_cov
         ) in verdict.reasons
 
 
+def test_a_scan_flown_higher_or_lower_than_the_calibration_s_is_unavailable(
+    white_mountains: Terrain, honest: Scan
+) -> None:
+    """The antenna is at 761 m, the ground below it at 402.8 m."""
+    for lowest, highest, verdict_told in ((300, 400, "ok"), (200, 300, "unavailable"), (400, 500, "unavailable")):
+        limits = Limits(lowest=lowest, highest=highest)
+        calibration = CALIBRATED.model_copy(update={"height_m": limits})
+        verdict, _ = judge(white_mountains, honest, calibration=calibration)
+        assert verdict.verdict == verdict_told
+        said = f"m above ground, where calibration test radar has {lowest} to {highest} m: calibrate at the heights"
+        assert any(said in reason for reason in verdict.reasons) == (verdict_told != "ok")
+
+
 def test_a_gap_in_the_terrain_below_the_aircraft_is_named_and_a_gap_elsewhere_is_not(
     white_mountains: Terrain, honest: Scan
 ) -> None:
@@ -172,6 +186,29 @@ def test_a_gap_in_the_terrain_below_the_aircraft_is_named_and_a_gap_elsewhere_is
         verdict, _ = judge(Terrain(white_mountains.grid.with_heights(height_m), [], ""), honest)
         assert (gap in verdict.reasons) == said
         assert (verdict.verdict == "unavailable") == said
+
+
+def test_a_scan_over_a_gap_is_not_ok_though_later_radials_begin_beside_it(
+    white_mountains: Terrain, honest: Scan
+) -> None:
+    """The first half of the sweep begins over the gap: the other half has pairs enough for a verdict."""
+    grid, aircraft = white_mountains.grid, flying()
+    height_m = grid.height_m.copy()
+    height_m[739:741, 337:339] = np.nan  # ten rows to the north
+    times = 100 * MS + MS * np.arange(len(honest.time_ns))
+    moved = times[len(times) // 2]
+    track = Track(aircraft.tracks["latitude_deg"].quantity)
+    at = np.array([times[0] - 1, moved - 2, moved - 1, times[-1] + 1])
+    latitude_deg = HERE["latitude_deg"] + np.array([10, 10, 0, 0]) * grid.row_deg
+    track.append(at, latitude_deg, np.zeros(4, np.uint8))
+    aircraft.tracks["latitude_deg"] = track
+    settings = MonitorSettings(minimum_pairs=4, p_fa=0.05)
+    verdict, _ = judge(
+        Terrain(grid.with_heights(height_m), [], ""), replace(honest, time_ns=times), aircraft, settings=settings
+    )
+    assert verdict.n_pairs >= 4
+    assert verdict.verdict != "ok"
+    assert "gap below the aircraft" in verdict.reasons[0]
 
 
 def test_an_aircraft_below_the_stored_terrain_is_never_ok(white_mountains: Terrain, honest: Scan) -> None:

@@ -10,7 +10,7 @@ from monitor.settings import MonitorSettings
 
 IMPOSSIBLE: list[tuple[str, list[Any], str]] = [
     ("method", ["paper!", "", None], "Input should be 'robust' or 'paper'"),
-    ("p_fa", [0, 0.5, -1e-4, nan, inf], "(greater than 0|less than 0.5)"),
+    ("p_fa", [0, 0.5, -1e-4, nan, inf], "(greater than or equal to 0.000000000001|less than 0.5)"),
     ("p_md", [0, 1, nan, inf], "(greater than 0|less than 1)"),
     ("minimum_pairs", [1, 0, -5, 10**30], "(greater than or equal to 2|less than or equal to 65536)"),
     ("minimum_pairs", [16.5, inf, "many"], "(integer|finite number)"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from monitor.aircraft import Aircraft
-from monitor.calibration import Calibration, LevelLimits
+from monitor.calibration import Calibration, Limits
 from monitor.integrity import Monitor
 from monitor.scans import Scan
 from monitor.settings import MonitorSettings
@@ -19,7 +19,7 @@ WINDOW = 4
 NEEDED = 20
 SECTOR = slice(10, 29)  # radials that have some pairs, and too few for a verdict
 LEVEL = 3.0  # of the honest scan, where it is lit
-LEVELS = LevelLimits(lowest=LEVEL - 0.5, highest=LEVEL + 0.5)
+LEVELS = Limits(lowest=LEVEL - 0.5, highest=LEVEL + 0.5)
 # The clip is so wide that as many pairs as are needed can alert.
 OF_ANY_RANGE = CALIBRATED.model_copy(update={"range_nm": None, "level": LEVELS, "spread_bins": 3.0})
 TOGETHER = "pairs of the last 2 scans together"
