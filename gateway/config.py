@@ -1,5 +1,6 @@
 """The configuration of a rack: one TOML file, checked as a whole before anything opens."""
 
+import math
 import re
 import tomllib
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from pydantic import (
     ValidationInfo,
     model_validator,
 )
+from pydantic_core import ErrorDetails
 
 from decoders import control708
 from decoders.definitions import Definitions, load_definitions, parse_definitions
@@ -233,7 +235,16 @@ def check_config(table: dict[str, object], origin: str, base: Path = Path()) -> 
         return RackConfig.model_validate(table, context={"base": base})
     except ValidationError as error:
         problems = "; ".join(
-            f"{'.'.join(str(part) for part in problem['loc']) or 'the whole'}: {problem['msg']}"
+            f"{'.'.join(str(part) for part in problem['loc']) or 'the whole'}: {_said(problem)}"
             for problem in error.errors()
-        ).replace("Value error, ", "")
+        )
         raise GatewayError(f"{origin}: {problems}") from error
+
+
+def _said(problem: ErrorDetails) -> str:
+    """What is wrong with a value, in words for whoever wrote it."""
+    if problem["type"] == "extra_forbidden":
+        return "there is no such option: see docs/options.md for [monitor], examples/rack.toml for the rest"
+    if isinstance(problem["input"], float) and math.isnan(problem["input"]):
+        return "it is no number"
+    return problem["msg"].removeprefix("Value error, ")

@@ -125,6 +125,8 @@ class TerrainFiles:
 def _opened(path: Path) -> Iterator[rasterio.DatasetReader]:
     """A file in degrees, for as long as it is read."""
     try:
+        if path.is_dir():
+            raise TerrainError(f"terrain {path} is a directory: name the files in it, one after the other")
         if not path.is_file():
             raise TerrainError(f"terrain file {path} does not exist: check the path in the configuration or --dem")
         path.open("rb").close()

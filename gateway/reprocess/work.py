@@ -11,6 +11,7 @@ from gateway.config import RackConfig
 from gateway.core import Core
 from gateway.errors import GatewayError
 from gateway.events import Event, IntegrityEvent, ScanEvent, SummaryEvent
+from gateway.framing import form_of
 from gateway.metadata import build_monitor, recorded_config, recorded_monitor
 from gateway.pipeline import Pipeline
 from gateway.recording import Recording
@@ -94,6 +95,12 @@ def set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
             f"{job.path} was recorded from {', '.join(sorted(names))}, and the rack file names none of them: "
             f"give one of its adapters ({', '.join(sorted(given))}) that name"
         )
+    for before, now in ((a, b) for a in recorded.adapters for b in config.adapters if a.name == b.name):
+        if form_of(before)[1:] != form_of(now)[1:]:
+            raise GatewayError(
+                f"{job.path} was recorded from {before.source}, whose bytes are read in another way than those of "
+                f"{now.source}: give {now.name} the kind of line that it had"
+            )
     maps = (*config.terrain, *config.water, *((config.calibration,) if config.calibration else ()))
     files = [(path, *_size_and_change(path)) for path in maps if path.exists()]
     made_with = tuple((name, recording.metadata[name]) for name in MADE_WITH if name in recording.metadata)

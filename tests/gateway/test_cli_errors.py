@@ -97,7 +97,7 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
     "no terrain": (lambda d: source("--dem", file(d, b"text")), ("file cannot be read as terrain", "GeoTIFF")),
     "no TOML": (lambda d: rack(d, "adapters = ["), ("rack.toml is not TOML",)),
     "missing rack": (lambda d: ["run", "-c", d / "no.toml"], ("no.toml", "No such file")),
-    "unknown key": (lambda d: rack(d, RACK + "speed = 1"), ("rack.toml: adapters.0.speed", "not permitted")),
+    "unknown key": (lambda d: rack(d, RACK + "speed = 1"), ("rack.toml: adapters.0.speed", "there is no such option")),
     "bad value": (lambda d: rack(d, RACK + "[monitor]\np_fa = 2"), ("monitor.p_fa", "less than 0.5")),
     "unknown kind": (lambda d: ["run", "--source", "tin:can"], ("'tin:can': unknown kind 'tin'", "use one of serial")),
     "no source": (lambda d: ["run"], ("-c", "--source, such as serial:")),

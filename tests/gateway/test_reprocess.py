@@ -201,11 +201,24 @@ def test_one_recording_that_cannot_be_worked_out_costs_no_other(flights: Path, t
     assert "is not a shadebus recording" in run.stderr
 
 
-def test_a_rack_file_that_names_no_adapter_of_the_recording_is_refused(flights: Path, tmp_path: Path) -> None:
-    (tmp_path / "rack.toml").write_text('[[adapters]]\nname = "other"\nsource = "serial:x"\n')
+@pytest.mark.parametrize(
+    ("name", "source", "said"),
+    [
+        ("other", "serial:x", "was recorded from bridge, and the rack file names none of them"),
+        (
+            "bridge",
+            "udp:127.0.0.1:1",
+            "read in another way than those of udp:127.0.0.1:1: give bridge the kind of line",
+        ),
+    ],
+)
+def test_a_rack_file_that_does_not_fit_the_recording_is_refused(
+    flights: Path, tmp_path: Path, name: str, source: str, said: str
+) -> None:
+    (tmp_path / "rack.toml").write_text(f'[[adapters]]\nname = "{name}"\nsource = "{source}"\n')
     run = shadebus("reprocess", flights, "-o", tmp_path / "out", "-c", tmp_path / "rack.toml")
     assert run.returncode == 1
-    assert "was recorded from bridge, and the rack file names none of them" in run.stderr
+    assert said in run.stderr
 
 
 def test_a_directory_without_recordings_and_a_scheduler_that_is_not_there_are_named(
