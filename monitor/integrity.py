@@ -93,6 +93,7 @@ class Monitor:
         comparison, left_out = compare(scan, chosen, pointing, here, self.settings, screens)
         reasons += [*told, *left_out]
         doubts = [*uncovered(ground_m, self.terrain.extent, pointing), *_buried(ground_m, pointing)]
+        doubts += self._beyond_calibration(comparison.height_m)
         if self.settings.tracked_scans > 1:
             every, known, _ = point(scan, aircraft, steady, self.settings)
             fronts = fronts_of(scan, steady[known], every, here.grid, self.settings)
@@ -212,17 +213,20 @@ class Monitor:
     def _unlike_calibration(self, sample: ScanSample) -> list[str]:
         """What makes the calibration, and with it every probability, worthless for a scan."""
         c = self.calibration
-        unlike = []
-        if c and c.level and not c.level.hold(sample.level):
-            found = "nothing is lit" if math.isnan(sample.level) else f"the mean level is {sample.level:.2f}"
-            levels = f"{c.level.lowest:.2f} to {c.level.highest:.2f}"
-            mend = "check the radar's gain"
-            unlike.append(f"{found} in the farther half, where calibration {c.name} has {levels}: {mend}")
-        if c and c.height_m and not math.isnan(sample.height_m) and not c.height_m.hold(sample.height_m):
-            heights = f"{c.height_m.lowest:.0f} to {c.height_m.highest:.0f} m"
-            mend = "calibrate at the heights that are flown"
-            unlike.append(f"{sample.height_m:.0f} m above ground, where calibration {c.name} has {heights}: {mend}")
-        return unlike
+        if c is None or c.level is None or c.level.hold(sample.level):
+            return []
+        found = "nothing is lit" if math.isnan(sample.level) else f"the mean level is {sample.level:.2f}"
+        levels = f"{c.level.lowest:.2f} to {c.level.highest:.2f}"
+        return [f"{found} in the farther half, where calibration {c.name} has {levels}: check the radar's gain"]
+
+    def _beyond_calibration(self, height_m: float) -> list[str]:
+        """What forbids an ok at heights where nobody knows what is normal; an alert may be of the terrain's height."""
+        c = self.calibration
+        if c is None or c.height_m is None or math.isnan(height_m) or c.height_m.hold(height_m):
+            return []
+        heights = f"{c.height_m.lowest:.0f} to {c.height_m.highest:.0f} m"
+        mend = "calibrate at the heights that are flown"
+        return [f"{height_m:.0f} m above ground, where calibration {c.name} has {heights}: {mend}"]
 
     def _contradictions(self, sample: ScanSample, pairs: NDArray[np.float64], findings: Findings) -> list[str]:
         """What forbids an ok that rests on stated defaults: they may be too wide for this radar, and hide an error."""
