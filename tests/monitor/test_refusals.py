@@ -16,7 +16,7 @@ from monitor.scans import Scan
 from monitor.settings import MonitorSettings
 from monitor.terrain import Terrain
 from monitor.track import Track
-from tests.monitor.scanning import ANGLES, CALIBRATED, HERE, MS, NO_COMPUTED_DATA, VOUCHED, flying, judge
+from tests.monitor.scanning import ANGLES, CALIBRATED, HERE, MS, NO_COMPUTED_DATA, VOUCHED, flying, judge, moved
 
 FAN_DEG = Beam().azimuth_span * Beam().width_deg
 
@@ -162,7 +162,7 @@ def test_an_aircraft_outside_the_stored_terrain_is_named_with_what_the_files_cov
         ) in verdict.reasons
 
 
-def test_a_scan_flown_higher_or_lower_than_the_calibration_s_is_unavailable(
+def test_a_scan_flown_higher_or_lower_than_the_calibration_s_is_not_ok_but_may_alert(
     white_mountains: Terrain, honest: Scan
 ) -> None:
     """The antenna is at 761 m, the ground below it at 402.8 m."""
@@ -173,6 +173,9 @@ def test_a_scan_flown_higher_or_lower_than_the_calibration_s_is_unavailable(
         assert verdict.verdict == verdict_told
         said = f"m above ground, where calibration test radar has {lowest} to {highest} m: calibrate at the heights"
         assert any(said in reason for reason in verdict.reasons) == (verdict_told != "ok")
+        wrong, _ = judge(white_mountains, moved(honest, 4), calibration=calibration)
+        assert wrong.verdict == "alert"
+        assert any(said in reason for reason in wrong.reasons) == (verdict_told != "ok")
 
 
 def test_a_gap_in_the_terrain_below_the_aircraft_is_named_and_a_gap_elsewhere_is_not(
