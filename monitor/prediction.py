@@ -151,12 +151,12 @@ def tangents(
     ranges_m = bins.levels_m[-1]
     tolerance = single(SETTLED) * (ranges_m[1] - ranges_m[0]) if ranges_m.size > 1 else ZERO
     clear = clear_m(grid.ceiling_m, track, height_m, dmin, tolerance, ranges_m[-1]) if drop >= 0 else 0.0
-    begin = max(int(np.searchsorted(ranges_m, clear, "right")) - 1, 0) // LANES * LANES
+    begin = max(_within(ranges_m, clear) - 1, 0) // LANES * LANES
     _look(grid.height_m, _way(track, ranges_m[-1], grid.height_m.shape), single(height_m), single(below), bins, begin)
     ground, guessed = bins.places[0][begin:], bins.places[2][begin:]
     end = _settled(single(height_m), ground, guessed, ranges_m[begin:], tolerance, single(drop), delta[begin:])
     ground = bins.places[0]
-    first = max(begin, int(np.searchsorted(ranges_m, abs(height_m - below), "right")))
+    first = max(begin, _within(ranges_m, abs(height_m - below)))
     delta[:first] = -math.inf
     for j in range(first, begin + end):
         if math.isnan(delta[j]):
@@ -172,6 +172,15 @@ def tangents(
             s = _distance(ranges_m[j], depth)
             delta[j] = _lowered(-depth / s, s * drop)
     return False
+
+
+@njit(cache=True)
+def _within(ranges_m, limit_m):  # type: ignore[no-untyped-def] # typed by tangents
+    """How many bins lie no farther than a limit; a search would cost a machine's first start a second."""
+    count = 0
+    for j in range(ranges_m.size):
+        count += ranges_m[j] <= limit_m
+    return count
 
 
 @njit(cache=True, error_model="numpy")
