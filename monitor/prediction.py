@@ -24,7 +24,7 @@ LEVELS = (16, 4, 1)  # bins whose ground is looked up at once: every 16th, every
 LANES = 16  # bins a loop takes at a time; the first looked up is a multiple, or the rest would go one by one
 MOST_LOOKS = 40  # half of them halve a range setting to less than a centimetre
 
-# Of single precision eight bins go at a time, of double four. A place is then off by less than a centimetre in 100 km,
+# Of single precision eight bins go at a time, of double four. A place is then off by about a centimetre in 100 km,
 # since it is counted from the antenna's own post, and a tangent by a part in 10^7. Any other number in their midst, be
 # it a whole one, would turn them into doubles.
 single: Any = np.float32  # or mypy would have Python's floats where these stand
