@@ -3,7 +3,8 @@
 A recorded flight is two minutes over real terrain: a radar of 80 words/s, an IRU, a GNSS receiver and a radio
 altimeter, in packets and chunks of 10 ms. An hour is thirty such recordings. The IRU and the GNSS receiver send every
 label of their sets at its shortest interval, or their buses are full to the brim (2778 words/s each). What is timed is
-the command `shadebus reprocess` from its start to its end, beside a copy of the files.
+the command `shadebus reprocess` from its start to its end, beside a copy of the files. What an hour more costs says
+whether the cost is linear: the start, some seconds of imports, is in every run.
 """
 
 import shutil
@@ -12,6 +13,7 @@ import sys
 import tempfile
 import time
 from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +44,7 @@ EPOCH_NS = 1_780_000_000 * SECOND_NS
 
 
 def main() -> None:
-    """Print a line for each number of hours, with either load."""
+    """Print a line for each number of hours, and what an hour more costs, with either load."""
     with tempfile.TemporaryDirectory() as directory:
         for load, brim in (("every label at its shortest interval", False), ("buses full to the brim", True)):
             place = Path(directory) / f"{brim}"
@@ -50,11 +52,14 @@ def main() -> None:
             record(place / "flight.mcap", brim=brim)
             size_mib = (place / "flight.mcap").stat().st_size * AN_HOUR / 2**20
             print(f"{load}: {size_mib:.0f} MiB an hour, in {AN_HOUR} recordings")
-            for hours in HOURS:
-                _measure(place / f"{hours}", place / "flight.mcap", hours)
+            whole_s = {hours: _measure(place / f"{hours}", place / "flight.mcap", hours) for hours in HOURS}
+            for few, many in pairwise(HOURS):
+                more_s = (whole_s[many] - whole_s[few]) / (many - few)
+                print(f"from {few} to {many} h an hour more costs {more_s:.2f} s: {3600 / more_s:.0f} times real time")
 
 
-def _measure(place: Path, flight: Path, hours: int) -> None:
+def _measure(place: Path, flight: Path, hours: int) -> float:
+    """Print what so many hours cost; how many seconds the whole command took."""
     recordings = place / "recordings"
     recordings.mkdir(parents=True)
     for number in range(hours * AN_HOUR):
@@ -80,6 +85,7 @@ def _measure(place: Path, flight: Path, hours: int) -> None:
         f"largest worker {largest_mib:.0f} MiB",
         flush=True,
     )
+    return whole_s
 
 
 def _watch(running: subprocess.Popen[bytes]) -> float:
