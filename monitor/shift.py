@@ -40,6 +40,14 @@ class Score(NamedTuple):
     stretch_information: float  # sum(w^2)
 
 
+class MeanShift(NamedTuple):
+    """A shift north and east in range bins (2,), its standard errors, and its chi-square of two degrees of freedom."""
+
+    bins: NDArray[np.float64]
+    stderr_bins: NDArray[np.float64]
+    statistic: float
+
+
 def score(sample: ScanSample, median: float, clip: float) -> Score:
     """Sums over the pairs of a sample, about a median and clipped, in range bins."""
     z = clipped(sample.disparities, median, clip)
@@ -76,3 +84,14 @@ def common_errors(scans: Sequence[Score], sigma: float) -> CommonErrors:
         mean = np.mean([shift_statistic(scan, sigma, middle) for scan in scans])
         low, high = (middle.place_bins, high) if mean > 2 else (low, middle.place_bins)
     return CommonErrors(place_bins=high if low else 0.0, stretch=stretch)
+
+
+def mean_shift(scans: Sequence[Score]) -> MeanShift:
+    """The shift that scans have in common, and how certain it is by how much they differ among each other."""
+    shifts, information = (np.array(column) for column in zip(*((s.shift, s.information) for s in scans), strict=True))
+    inverse = np.linalg.pinv(information.sum(axis=0), LEAST_INFORMATION, hermitian=True)
+    bins = inverse @ shifts.sum(axis=0)
+    left = (shifts - information @ bins) @ inverse  # what each scan would move the mean by
+    covariance = left.T @ left * len(scans) / max(len(scans) - 1, 1)
+    certainty = np.linalg.pinv(covariance, LEAST_INFORMATION, hermitian=True)
+    return MeanShift(bins, np.sqrt(np.diag(covariance)), float(bins @ certainty @ bins))

@@ -5,6 +5,7 @@ the reference, so the residuals are disparities with the errors of both: what th
 """
 
 import json
+import math
 from collections import Counter
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -18,9 +19,12 @@ from gateway.console import utc
 from gateway.errors import GatewayError
 from monitor.calibration import Calibration
 from monitor.fitting import fit
+from monitor.geodesy import NM_M
 from monitor.residuals import NORMALITY_TEST, moments, normality
+from monitor.shift import mean_shift, score, shift_threshold
 
 P_FAS = (1e-1, 1e-2, 1e-3)
+BY_CHANCE = 1e-6  # a mean shift that is less likely is none, if it is larger than a range bin
 FLY = "fly a few hundred metres above the ground over terrain of the class in question, with the radar in map mode"
 HEADINGS = ("range limit (NM)", "shadow size (bins)", "residuals", "mean (bins)", "sigma (bins)", "p if normal")
 EXPLANATION = f"""Residuals of shadow centres, radar minus terrain, in range bins, over all scans. Whole shadows up
@@ -115,6 +119,22 @@ def calibration(name: str, reads: Sequence[Read], found: Material, least_scans: 
         )
     except ValueError as error:
         raise GatewayError(f"these recordings give no calibration: {error}") from error
+
+
+def displacement(found: Material, made: Calibration) -> str:
+    """Where the stored terrain lies from where the radar sees it, on average; and what to check if that is far off."""
+    shift = mean_shift([score(scan.sample, made.median_bins, made.clip_bins) for scan in found.scans])
+    bin_m = found.setting.range_nm * NM_M / found.setting.bins
+    # Terrain that lies farther north than where the radar sees it has its shadows farther off there than the radar's.
+    north, east = -bin_m * shift.bins
+    errors = " and ".join(f"{error:.0f}" for error in bin_m * shift.stderr_bins)
+    where = (
+        f"{abs(north):.0f} m {'north' if north > 0 else 'south'} and {abs(east):.0f} m {'east' if east > 0 else 'west'}"
+    )
+    said = f"on average the stored terrain lies {where} of where the radar sees it (standard errors {errors} m)"
+    if math.hypot(north, east) <= bin_m or shift.statistic <= shift_threshold(BY_CHANCE):
+        return said
+    return f"{said}: check its datum, the position's source and the lever arm, or this calibration hides that error"
 
 
 def _provenance(reads: Sequence[Read], found: Material, usable: int) -> str:

@@ -27,7 +27,7 @@ def calibrate_radar(
     from rich.progress import track
 
     from gateway.calibrate.page import Results, write_page
-    from gateway.calibrate.radar import EXPLANATION, HEADINGS, calibration, histograms, material, table
+    from gateway.calibrate.radar import EXPLANATION, HEADINGS, calibration, displacement, histograms, material, table
     from gateway.calibrate.recorded import read
     from gateway.calibrate.workers import on_all_cores
     from gateway.config import load_config
@@ -53,6 +53,7 @@ def calibrate_radar(
     output.write_text(made.model_dump_json(indent=2) + "\n", encoding="utf-8")
     for rate in made.checked:
         typer.echo(f"P_FA {rate.p_fa:g}: {rate.alerts} alerts in the {rate.scans} scans that were not fitted")
+    typer.echo(displacement(found, made))
     typer.echo(made.provenance)
     if report:
         page = Results(f"Calibration {made.name}", made.provenance, EXPLANATION, HEADINGS, rows, histograms(found))

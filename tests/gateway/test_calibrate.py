@@ -2,13 +2,17 @@
 
 import hashlib
 import json
+import math
 import os
+import re
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import rasterio
+from rasterio.transform import Affine
 from typer.testing import CliRunner, Result
 
 from gateway.calibrate.dem import as_published, figures, monte_carlo, setup_of
@@ -86,6 +90,29 @@ def test_recorded_flights_become_a_file_that_the_monitor_loads(flights: Path, tm
     assert (np.diff(counts, axis=1) < 0).all()
     assert (page / "residuals.png").read_bytes().startswith(b"\x89PNG")
     assert all(f"<td>{cell[2]}<td>{cell[3]}" in (page / "index.html").read_text() for cell in cells)
+
+
+def test_where_the_terrain_lies_is_told_and_a_calibration_over_wrong_terrain_owns_up_to_it(
+    flights: Path, tmp_path: Path
+) -> None:
+    with rasterio.open(MOUNTAINS) as source:
+        height_m, profile, to = source.read(), source.profile, source.transform
+    west = 300 / (111_320 * math.cos(math.radians(44.5)))  # of degrees a metre
+    east_by = Affine.translation(round(west / to.a) * to.a, 0) @ to
+    with rasterio.open(tmp_path / "east.tif", "w", **{**profile, "driver": "GTiff", "transform": east_by}) as moved:
+        moved.write(height_m)
+    asked = ("calibrate", "radar", flights, "-o", tmp_path / "out.json", "--least-scans", "4")
+    right, wrong = invoke(*asked), invoke(*asked, "--dem", tmp_path / "east.tif")
+    told = re.compile(r"lies \d+ m \w+ and (\d+) m (\w+) of where .* \(standard errors \d+ and \d+ m\)(.*)")
+    (rightly_m, silent), (off_m, advice) = (
+        (int(metres) if side == "east" else -int(metres), said)
+        for run in (right, wrong)
+        for metres, side, said in told.findall(run.output)
+    )
+    assert abs(rightly_m) < 40
+    assert not silent
+    assert off_m == pytest.approx(300, abs=100)
+    assert advice.startswith(": check its datum")
 
 
 def test_what_is_fitted_is_what_the_verdicts_of_a_replay_rest_on(flights: Path) -> None:

@@ -9,7 +9,7 @@ from scipy.stats import chi2, kstest
 
 from monitor.calibration import CommonErrors
 from monitor.sample import ScanSample, Unmatched
-from monitor.shift import LARGEST_BINS, common_errors, score, shift_statistic, shift_threshold
+from monitor.shift import LARGEST_BINS, common_errors, mean_shift, score, shift_statistic, shift_threshold
 
 WIDE = 1e9  # a clip that clips nothing
 NONE = Unmatched(0, 0)
@@ -108,3 +108,22 @@ def test_scans_that_their_scatter_explains_have_no_error_in_common() -> None:
 def test_no_error_in_common_is_larger_than_any_receivers() -> None:
     one = scan(np.full(10, 1e6), np.linspace(0, 1, 10), np.resize([1.0, -1.0], 10))
     assert common_errors([score(one, 0.0, WIDE)] * 3, 1.0).place_bins == LARGEST_BINS
+
+
+def test_the_mean_shift_is_the_one_that_the_scans_have_within_its_standard_errors() -> None:
+    truth, common = np.array([1.5, -0.7]), CommonErrors(place_bins=0.5, stretch=0.0)
+    shifts = []
+    for seed in range(200):
+        found = mean_shift([score(one, 0.0, WIDE) for one in flown(seed, 2.0, common, tuple(truth), scans=50)])
+        shifts.append((found.bins - truth) / found.stderr_bins)
+    assert np.abs(np.mean(shifts, axis=0)).max() < 3 / np.sqrt(200)
+    assert np.std(shifts, axis=0) == pytest.approx(1.0, abs=0.15)
+
+
+def test_the_certainty_of_a_mean_shift_is_chi_square_where_there_is_none() -> None:
+    common = CommonErrors(place_bins=0.5, stretch=0.0)
+    found = [
+        mean_shift([score(one, 0.0, WIDE) for one in flown(seed, 2.0, common, scans=200)]).statistic
+        for seed in range(300)
+    ]
+    assert kstest(found, chi2(2).cdf).pvalue > 0.01
