@@ -13,7 +13,8 @@ from monitor.settings import MonitorSettings
 HEAD = """# Options of the monitor
 
 Written by `python -m gateway.option_table`, from what the monitor checks. All stand below `[monitor]` in the rack file;
-an option that is not there and a value out of its bounds are refused at the start, by their names.
+an option that is not there, a value of another kind (a number in quotes) and one out of its bounds are refused at the
+start, by name.
 Units are in the names or in the sentences.
 
 | option | default | may be | what it is |

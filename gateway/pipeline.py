@@ -70,7 +70,7 @@ class Pipeline:
         self._owned_up: set[str] = set()  # and those that a verdict has named
         self._troubles: dict[str, str] = {}  # what the next verdict must own up to, by adapter
         if monitor and not before:
-            self._troubles |= {text: text for text in monitor.untested}
+            self._troubles |= {text: text for text in monitor.told_first}
         if before:
             self._counters = before._counters
             self._scans.number = before._scans.number

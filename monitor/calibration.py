@@ -157,7 +157,7 @@ def load_calibration(path: Path) -> Calibration:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "the file"
-        mend = "if another version made it, make it anew with shadebus calibrate radar"
+        mend = "mend it, or make it anew with shadebus calibrate radar"
         raise ValueError(f"calibration file {path}: {place}: {first['msg']}; {mend}") from error
     if found.name == NO_CALIBRATION:
         raise ValueError(f"calibration file {path}: its name is {NO_CALIBRATION!r}, as if there were none: rename it")

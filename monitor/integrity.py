@@ -243,9 +243,10 @@ class Monitor:
         return ["no calibration loaded: stated defaults in use"] if self.calibration is None else []
 
     @property
-    def untested(self) -> list[str]:
-        """What the calibration does not allow to be tested although the settings would have it, and why."""
-        return untested(self.settings, self.calibration) if self.calibration else []
+    def told_first(self) -> list[str]:
+        """What the first verdict says: what the settings ask for and cannot have, of the calibration or the water."""
+        water = self.water.idle(self.terrain) if self.water else []
+        return water + (untested(self.settings, self.calibration) if self.calibration else [])
 
 
 def _buried(ground_m: NDArray[np.float64], pointing: Pointing) -> list[str]:

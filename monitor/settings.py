@@ -27,7 +27,7 @@ HeightSource = Literal["076", "370"]
 class LeverArm(BaseModel):
     """From the GNSS antenna to the radar antenna in the aircraft's body, metres."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     forward_m: float = Field(0.0, ge=-100, le=100)
     right_m: float = Field(0.0, ge=-100, le=100)
     down_m: float = Field(0.0, ge=-100, le=100)
@@ -36,7 +36,7 @@ class LeverArm(BaseModel):
 class MonitorSettings(BaseModel):
     """The integrity monitor's options; the defaults are the ones the evidence is given for."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     method: Literal["robust", "paper"] = Field("robust", description="which test decides: clipped Q, or T as published")
     p_fa: float = Field(1e-4, ge=1e-12, lt=0.5, description="probability of a false alert in one scan")

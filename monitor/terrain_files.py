@@ -146,7 +146,8 @@ def _opened(path: Path) -> Iterator[rasterio.DatasetReader]:
     except PermissionError as error:
         raise TerrainError(f"terrain file {path} may not be read: give this user the right to read it") from error
     except (RasterioError, OSError) as error:
-        raise TerrainError(f"{path} cannot be read as terrain (GeoTIFF, HGT or DTED): {error}") from error
+        mend = "get it anew, whole, or convert it with gdal_translate"
+        raise TerrainError(f"{path} cannot be read as terrain (GeoTIFF, HGT or DTED): {error}: {mend}") from error
 
 
 def _header(path: Path) -> Sheet:

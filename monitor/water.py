@@ -77,6 +77,13 @@ class WaterFiles:
             water = self._drawn[terrain] = Water(terrain.grid, _large(wet, terrain.grid, self._minimum_km2))
         return water
 
+    def idle(self, terrain: Terrain) -> list[str]:
+        """What to say of water that has no effect on terrain in memory; of other terrain it is not known."""
+        if isinstance(terrain, WideTerrain) or self.on(terrain).wet.any():
+            return []
+        names = ", ".join(map(str, self._draws))
+        return [f"no water of {self._minimum_km2:g} km2 or more lies on the terrain: {names} has no effect"]
+
 
 def open_water(path_or_paths: Path | Sequence[Path], terrain: Terrain, minimum_km2: float) -> WaterFiles:
     """Read where the water of some files lies; what is smaller than `minimum_km2` on the terrain will be left out.
@@ -103,7 +110,8 @@ def _told(path: Path) -> Iterator[None]:
     try:
         yield
     except (RasterioError, OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise WaterError(f"water file {path} cannot be read as a raster or GeoJSON: {error}") from error
+        mend = "name a raster of one band or GeoJSON polygons"
+        raise WaterError(f"water file {path} cannot be read as a raster or GeoJSON: {error}: {mend}") from error
 
 
 def _raster(path: Path, extent: Extent) -> Draw:

@@ -1,12 +1,15 @@
 """`shadebus calibrate radar | dem`: how much disparity is normal."""
 
 from pathlib import Path
+from textwrap import shorten
 from typing import Annotated
 
 import typer
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="file to write (JSON)")]
 Report = Annotated[Path | None, typer.Option(help="directory for a page with the table and histograms")]
+MOST_SAID = 1000  # characters of a provenance, which names every recording
+
 Rack = Annotated[Path | None, typer.Option("-c", "--config", help="rack file")]
 
 
@@ -54,7 +57,7 @@ def calibrate_radar(
     for rate in made.checked:
         typer.echo(f"P_FA {rate.p_fa:g}: {rate.alerts} alerts in the {rate.scans} scans that were not fitted")
     typer.echo(displacement(found, made))
-    typer.echo(made.provenance)
+    typer.echo(shorten(made.provenance, MOST_SAID, placeholder=f" ... (the rest stands in {output})"))
     if report:
         page = Results(f"Calibration {made.name}", made.provenance, EXPLANATION, HEADINGS, rows, histograms(found))
         typer.echo(f"report: {write_page(report, page)}")

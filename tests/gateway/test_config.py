@@ -62,6 +62,8 @@ def test_paths_count_from_where_the_rack_file_lies(tmp_path: Path) -> None:
         (ADAPTER + "[recording]\nsync_interval_s = 0", "recording.sync_interval_s: .*greater than 0"),
         (ADAPTER + "[monitor]\np_fa = 0.7", "monitor.p_fa: .*less than 0.5"),
         (ADAPTER + "[monitor]\nlargest_integrity_limit_nm = 16", "largest_integrity_limit_nm: .*or equal to 15"),
+        (ADAPTER + '[monitor]\np_fa = "1e-4"', "monitor.p_fa: Input should be a valid number"),
+        (ADAPTER + "[monitor]\nposition_gate = 1", "monitor.position_gate: Input should be a valid boolean"),
         (ADAPTER + "[monitr]\np_fa = 0.1", "monitr: there is no such option"),
         (ADAPTER + ADAPTER, "two adapters are named 'bridge'"),
         ("adapters = [", "is not TOML"),

@@ -72,7 +72,8 @@ def scan_at(moved_m: float, time_ns: int, angles: NDArray[np.float64] = ANGLES) 
 
 
 def monitor_of(scans: int, **more: float) -> Monitor:
-    return Monitor(PLAIN, MonitorSettings(tracked_scans=scans, position_gate=False, **more))
+    asked = {"tracked_scans": scans, "position_gate": False, **more}
+    return Monitor(PLAIN, MonitorSettings.model_validate(asked))
 
 
 def judge(monitor: Monitor, number: int, step_m: float = STEP_M, time_ns: int | None = None) -> str:

@@ -243,3 +243,10 @@ def test_water_that_is_not_large_costs_nothing(white_mountains: Terrain, honest:
     water = open_water(lake, white_mountains, 1e6)
     verdict, _ = Monitor(white_mountains, MonitorSettings(), CALIBRATED, water).judge(honest, flying())
     assert verdict == judge(white_mountains, honest)[0]
+
+
+def test_water_that_has_no_effect_is_told(white_mountains: Terrain, tmp_path: Path) -> None:
+    lake = written(tmp_path / "lake.geojson", square(-71.6, 44.4, -71.5, 44.5))
+    pond, large = (Monitor(white_mountains, water=open_water(lake, white_mountains, km2)) for km2 in (200.0, 1.0))
+    assert pond.told_first == [f"no water of 200 km2 or more lies on the terrain: {lake} has no effect"]
+    assert not large.told_first

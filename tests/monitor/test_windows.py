@@ -37,7 +37,7 @@ def part(scan: Scan) -> Scan:
 
 
 def monitor_of(terrain: Terrain, calibration: Calibration = OF_ANY_RANGE, **settings: int) -> Monitor:
-    return Monitor(terrain, MonitorSettings(offset_search_m=0, **settings), calibration)
+    return Monitor(terrain, MonitorSettings.model_validate({"offset_search_m": 0, **settings}), calibration)
 
 
 def judged(monitor: Monitor, *seen: Seen, since: int = 0) -> list[Verdict]:
