@@ -8,9 +8,9 @@ import typer
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="file to write (JSON)")]
 Report = Annotated[Path | None, typer.Option(help="directory for a page with the table and histograms")]
-MOST_SAID = 1000  # characters of a provenance, which names every recording
-
 Rack = Annotated[Path | None, typer.Option("-c", "--config", help="rack file")]
+
+MOST_SAID = 1000  # characters of a provenance, which names every recording
 
 
 def calibrate_radar(
