@@ -42,6 +42,7 @@ class WithoutTerrain(Monitor):
     def __init__(self, settings: MonitorSettings) -> None:
         self.settings = settings
         self.calibration = None
+        self.water = None
 
     def judge(self, scan: Scan, aircraft: Aircraft) -> tuple[Verdict, Comparison | None]:  # noqa: ARG002 # as Monitor's
         """Unavailable."""
