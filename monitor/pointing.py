@@ -11,7 +11,9 @@ from monitor.gate import position_doubts
 from monitor.geodesy import HIGHEST_LATITUDE_DEG, body_to_enu, displace
 from monitor.prediction import Pointing
 from monitor.scans import Scan
-from monitor.settings import MonitorSettings
+from monitor.settings import LeverArm, MonitorSettings
+
+Radials = NDArray[np.float64]
 
 NEEDED = (state.LATITUDE, state.LONGITUDE, state.HEIGHT, state.PITCH, state.ROLL, state.HEADING)
 
@@ -39,25 +41,39 @@ def point(
         usable &= ~polar
         reasons.append(f"{np.count_nonzero(polar)} radials start beyond {HIGHEST_LATITUDE_DEG:g} degrees of latitude")
     lat, lon, height, pitch, roll, heading = (values.value[usable] for values in found[: len(NEEDED)])
-    arm = settings.lever_arm
-    ones = np.ones(len(lat))
-    east, north, up = body_to_enu(arm.forward_m * ones, arm.right_m * ones, arm.down_m * ones, roll, pitch, heading)
-    lat, lon, height = displace(lat, lon, height, east, north, up)
-    angle, tilt = np.radians(scan.scan_angle_deg[chosen][usable]), math.radians(scan.tilt_deg)
+    place = antenna(lat, lon, height, settings.lever_arm, roll, pitch, heading)
+    look = beam(scan, np.radians(scan.scan_angle_deg[chosen][usable]), roll, pitch, heading)
+    return Pointing(*place, *look), usable, reasons
+
+
+def antenna(
+    latitude_deg: Radials,
+    longitude_deg: Radials,
+    height_m: Radials,
+    arm: LeverArm,
+    roll_deg: Radials,
+    pitch_deg: Radials,
+    heading_deg: Radials,
+) -> tuple[Radials, Radials, Radials]:
+    """Latitude, longitude and height (n,) of the radar antenna, from those of the GNSS antenna: degrees and metres."""
+    ones = np.ones(len(latitude_deg))
+    body = arm.forward_m * ones, arm.right_m * ones, arm.down_m * ones
+    return displace(latitude_deg, longitude_deg, height_m, *body_to_enu(*body, roll_deg, pitch_deg, heading_deg))
+
+
+def beam(
+    scan: Scan, scan_angle_rad: Radials, roll_deg: Radials, pitch_deg: Radials, heading_deg: Radials
+) -> tuple[Radials, Radials]:
+    """Local-level azimuth and elevation (n,), radians; a stabilised antenna holds its angles against the horizon."""
+    tilt_rad = np.full(len(scan_angle_rad), math.radians(scan.tilt_deg))
     if scan.stabilised:
-        azimuth, elevation = np.radians(heading) + angle, np.full(len(lat), tilt)
-    else:
-        azimuth, elevation = boresight(angle, tilt * ones, roll, pitch, heading)
-    return Pointing(lat, lon, height, azimuth, elevation), usable, reasons
+        return np.radians(heading_deg) + scan_angle_rad, tilt_rad
+    return boresight(scan_angle_rad, tilt_rad, roll_deg, pitch_deg, heading_deg)
 
 
 def boresight(
-    scan_angle_rad: NDArray[np.float64],
-    tilt_rad: NDArray[np.float64],
-    roll_deg: NDArray[np.float64],
-    pitch_deg: NDArray[np.float64],
-    heading_deg: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    scan_angle_rad: Radials, tilt_rad: Radials, roll_deg: Radials, pitch_deg: Radials, heading_deg: Radials
+) -> tuple[Radials, Radials]:
     """Local-level azimuth and elevation (n,), radians, of an antenna that is fixed to the body but for its scan."""
     level = np.cos(tilt_rad)
     look = level * np.cos(scan_angle_rad), level * np.sin(scan_angle_rad), -np.sin(tilt_rad)

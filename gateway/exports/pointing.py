@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from monitor import quantities as state
 from monitor.aircraft import Aircraft
-from monitor.geodesy import body_to_enu, displace
+from monitor.pointing import antenna, beam
 from monitor.scans import Scan
 from monitor.settings import LeverArm
 from monitor.track import Quantity
@@ -54,27 +54,22 @@ def platform(scan: Scan, aircraft: Aircraft) -> dict[str, Rays]:
 
 def place(scan: Scan, aircraft: Aircraft, attitude: dict[str, Rays], arm: LeverArm) -> Place:
     """Where the radar antenna was: the GNSS position moved by the lever arm, as the monitor has it."""
-    found = [_at(aircraft, quantity, scan) for quantity in (state.LATITUDE, state.LONGITUDE, state.HEIGHT)]
-    if arm == LeverArm():
-        return Place(*found)
-    one = np.ones(len(scan.time_ns))
-    body = (arm.forward_m * one, arm.right_m * one, arm.down_m * one)
-    moved = body_to_enu(*body, attitude["roll"], attitude["pitch"], attitude["heading"])
-    return Place(*displace(found[0], found[1], found[2], *moved))
+    gnss = Place(*(_at(aircraft, quantity, scan) for quantity in (state.LATITUDE, state.LONGITUDE, state.HEIGHT)))
+    if arm == LeverArm():  # of which the attitude need not be known
+        return gnss
+    roll, pitch, heading = (attitude[name] for name in ("roll", "pitch", "heading"))
+    return Place(*antenna(*gnss, arm, roll, pitch, heading))
 
 
 def look(scan: Scan, attitude: dict[str, Rays]) -> Look:
-    """Where the beam pointed. A stabilised antenna holds its angles against the horizon and the heading's vertical."""
+    """Where the beam pointed, as the monitor has it."""
     roll, pitch, heading = (attitude[name] for name in ("roll", "pitch", "heading"))
-    tilt = np.full(len(heading), scan.tilt_deg)
+    azimuth, elevation = map(np.degrees, beam(scan, np.radians(scan.scan_angle_deg), roll, pitch, heading))
     if scan.stabilised:
-        azimuth = (heading + scan.scan_angle_deg) % 360
-        rotation, above = _in_aircraft(azimuth, tilt, roll, pitch, heading)
-        return Look(azimuth, tilt, rotation, above)
-    forward, right, up = _direction(scan.scan_angle_deg, tilt)
-    east, north, up = body_to_enu(forward, right, -up, roll, pitch, heading)
-    azimuth, elevation = _angles(north, east, up)
-    return Look(azimuth, elevation, scan.scan_angle_deg % 360, tilt)
+        in_aircraft = _in_aircraft(azimuth, elevation, roll, pitch, heading)
+    else:
+        in_aircraft = scan.scan_angle_deg % 360, np.full(len(heading), scan.tilt_deg)
+    return Look(azimuth % 360, elevation, *in_aircraft)
 
 
 def _at(aircraft: Aircraft, quantity: Quantity, scan: Scan) -> Rays:
@@ -88,11 +83,6 @@ def _direction(bearing_deg: Rays, above_deg: Rays) -> tuple[Rays, Rays, Rays]:
     return np.cos(above) * np.cos(bearing), np.cos(above) * np.sin(bearing), np.sin(above)
 
 
-def _angles(ahead: Rays, right: Rays, up: Rays) -> tuple[Rays, Rays]:
-    """Degrees clockwise from ahead in [0, 360), and degrees up."""
-    return np.degrees(np.arctan2(right, ahead)) % 360, np.degrees(np.arcsin(np.clip(up, -1, 1)))
-
-
 def _in_aircraft(
     azimuth_deg: Rays, elevation_deg: Rays, roll_deg: Rays, pitch_deg: Rays, heading_deg: Rays
 ) -> tuple[Rays, Rays]:
@@ -103,4 +93,4 @@ def _in_aircraft(
     pitched_up = level_up * np.cos(pitch) - level_ahead * np.sin(pitch)
     right = level_right * np.cos(roll) - pitched_up * np.sin(roll)
     up = pitched_up * np.cos(roll) + level_right * np.sin(roll)
-    return _angles(ahead, right, up)
+    return np.degrees(np.arctan2(right, ahead)) % 360, np.degrees(np.arcsin(np.clip(up, -1, 1)))
