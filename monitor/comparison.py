@@ -26,7 +26,7 @@ class Comparison:
 
     Centres of shadows are in range bins; `pair_radial` is the index of a pair's radial among those in use,
     `pair_azimuth_rad` that radial's true azimuth, and `pair_size` how many bins the pair's terrain shadow has.
-    `height_m` is the mean height of the antenna above the ground below it.
+    `height_over_ground_m` is the antenna's on all radials of the pointing, NaN where the ground below is not known.
     """
 
     scan_angle_deg: NDArray[np.float64]
@@ -39,7 +39,13 @@ class Comparison:
     dem_centre: NDArray[np.float64]
     unmatched_radar: Unmatched
     unmatched_dem: Unmatched
-    height_m: float
+    height_over_ground_m: NDArray[np.float64]
+
+    @property
+    def height_m(self) -> float:
+        """The mean height over the ground, NaN where that is known on no radial."""
+        known = self.height_over_ground_m[np.isfinite(self.height_over_ground_m)]
+        return float(known.mean()) if known.size else math.nan
 
     @property
     def disparities(self) -> NDArray[np.float64]:
@@ -92,15 +98,8 @@ def compare(
         foreseen["centre"][pairs["dem"]],
         Unmatched(*unmatched_share(counted[counted["size"] >= s.unmatched_size], every_predicted, dem)),
         Unmatched(*unmatched_share(expected[expected["size"] >= s.unmatched_size], every_seen, radar)),
-        _height_over_ground_m(pointing, terrain),
+        pointing.height_m - terrain.elevation(pointing.latitude_deg, pointing.longitude_deg),
     ), [*lost, *counts.reasons]
-
-
-def _height_over_ground_m(pointing: Pointing, terrain: Terrain) -> float:
-    """The mean over the radials below which the ground is known, NaN without one."""
-    height_m = pointing.height_m - terrain.elevation(pointing.latitude_deg, pointing.longitude_deg)
-    known = height_m[np.isfinite(height_m)]
-    return float(known.mean()) if known.size else math.nan
 
 
 def thin(scan_angle_deg: NDArray[np.float64], spacing_deg: float) -> NDArray[np.intp]:

@@ -7,10 +7,10 @@ from monitor.prediction import Pointing
 from monitor.terrain import Extent
 
 
-def uncovered(ground_m: NDArray[np.float64], extent: Extent, pointing: Pointing) -> list[str]:
-    """Reasons with their mend, for radials (n,) that start where the ground below (n,) is not known."""
+def uncovered(height_over_ground_m: NDArray[np.float64], extent: Extent, pointing: Pointing) -> list[str]:
+    """Reasons with their mend, for radials (n,) that start where the height over ground (n,) is not known."""
     lat, lon = pointing.latitude_deg, pointing.longitude_deg
-    unknown = np.isnan(ground_m)
+    unknown = np.isnan(height_over_ground_m)
     south, north, west, east = extent
     outside = unknown & ((lat < south) | (lat > north) | (lon < west) | (lon > east))
     reasons = []

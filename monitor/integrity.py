@@ -88,11 +88,11 @@ class Monitor:
             water = self.water.on(here) if self.water else None
         except (TerrainError, WaterError) as error:
             return self.unavailable(scan.number, [str(error), *reasons]), None
-        ground_m = here.elevation(pointing.latitude_deg, pointing.longitude_deg)
         screens, told = self._screens(scan, pointing, height_m, water)
         comparison, left_out = compare(scan, chosen, pointing, here, self.settings, screens)
         reasons += [*told, *left_out]
-        doubts = [*uncovered(ground_m, self.terrain.extent, pointing), *_buried(ground_m, pointing)]
+        over_ground_m = comparison.height_over_ground_m
+        doubts = [*uncovered(over_ground_m, self.terrain.extent, pointing), *_buried(over_ground_m)]
         doubts += self._beyond_calibration(comparison.height_m)
         if self.settings.tracked_scans > 1:
             every, known, _ = point(scan, aircraft, steady, self.settings)
@@ -249,9 +249,9 @@ class Monitor:
         return water + (untested(self.settings, self.calibration) if self.calibration else [])
 
 
-def _buried(ground_m: NDArray[np.float64], pointing: Pointing) -> list[str]:
+def _buried(height_over_ground_m: NDArray[np.float64]) -> list[str]:
     """What forbids an ok where the aircraft is under the ground, as terrain in feet or a wrong datum puts it."""
-    below_m = float(np.fmax.reduce(ground_m - pointing.height_m, initial=0.0))
+    below_m = float(np.fmax.reduce(-height_over_ground_m, initial=0.0))
     return [f"the aircraft is {below_m:.0f} m below the stored terrain: check unit and datum"] if below_m else []
 
 
