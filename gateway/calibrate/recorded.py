@@ -88,8 +88,7 @@ def read(job: Job) -> Read:
     core.finish()
     if failures:
         raise GatewayError(f"{job.path}: {failures[0]}; leave it out of the calibration, and tell us")
-    if recording.damaged or recording.torn:
-        found.damage = f"{recording.damaged} damaged places {recording.torn}".strip()
+    found.damage = "; ".join(recording.complaints)
     return found
 
 

@@ -26,5 +26,5 @@ def cut(
     source = Recording(recording)
     limits = (moment(start) if start is not None else None, moment(until) if until is not None else None)
     typer.echo(f"{cut_out(source, stop.until(source), *limits, out)} records written to {out}")
-    for damage in source.damage:
-        typer.echo(f"shadebus: {damage.path}: {damage.length} bytes from {damage.offset} on are damaged", err=True)
+    for text in source.complaints:
+        typer.echo(f"shadebus: {recording}: {text}", err=True)

@@ -30,5 +30,5 @@ def dump(
     wanted = Wanted.of(config, adapter or (), channel or (), label or ())
     for line in lines(stop.until(source), config, wanted):
         typer.echo(line)
-    if source.torn:
-        typer.echo(f"shadebus: {recording}: {source.torn}", err=True)
+    for text in source.complaints:
+        typer.echo(f"shadebus: {recording}: {text}", err=True)

@@ -49,7 +49,7 @@ def info(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
     if first and last:
         seconds = (last.monotonic_ns - first.monotonic_ns) / 1e9
         table.add_row("time", f"{clock(first.utc_ns)} to {clock(last.utc_ns)} UTC, {seconds:.1f} s")
-    table.add_row("records", f"{source.records} whole, {source.damaged} damaged places")
+    table.add_row("records", ", ".join([f"{source.records} whole", *source.losses]))
     for damage in source.damage[:SHOWN_PLACES]:
         table.add_row("damage", f"{damage.length} bytes at {damage.offset} of {damage.path.name}: {damage.what}")
     table.add_row("end", source.torn or "closed with its index")

@@ -63,7 +63,5 @@ def replay(
             break
     if source.torn:
         print(f"shadebus: {recording}: {source.torn}; every whole record was replayed", file=sys.stderr)
-    if source.damaged:
-        failures.append(f"{source.damaged} damaged record{'s' * (source.damaged > 1)} skipped")
-    if failures:
-        raise GatewayError(f"{recording}: " + "; ".join(failures))
+    if problems := failures + source.losses:
+        raise GatewayError(f"{recording}: " + "; ".join(problems))

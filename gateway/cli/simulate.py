@@ -89,8 +89,8 @@ def _transmit(path: Path, adapter: str | None, to: str, speed: float, stop: thre
     _play(units, outlet, to, speed, stop, pieces)
     for what, count in sent.left_out.items():
         typer.echo(f"left out: {count} {what}", err=True)
-    if source.torn:
-        typer.echo(f"shadebus: {path}: {source.torn}; every whole record was transmitted", err=True)
+    for text in source.complaints:
+        typer.echo(f"shadebus: {path}: {text}", err=True)
 
 
 def _as_recorded(sent: Any, to: str, carrier: str) -> Units:

@@ -66,8 +66,8 @@ def export(
     with fresh(path) as place:
         said = [f"{path}: {write(job, place)}"]
     said += [f"left out: {count} {what}" for what, count in job.left_out.items() if count]
-    if source.damaged:
-        said.append(f"left out: {source.damaged} damaged record{'s' * (source.damaged > 1)}")
+    if source.losses:
+        said.append(f"the recording has {', '.join(source.losses)}; every whole record is in")
     if source.torn:
         said.append(f"{source.torn}; every whole record is in")
     return said + [f"a defect cost part of a scan: {failure}" for failure in job.failures]

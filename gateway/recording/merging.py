@@ -63,13 +63,12 @@ def merge(recordings: Sequence[Recording], out: Path, until: Until = iter) -> li
     for source in sources:
         source.shift_ns -= min(earliest_ns, 0)  # of a host that was started before the first one
     adapters, told = _adapters(sources)
+    told += [f"{source.name}: {text}" for source in sources for text in source.recording.complaints]
     metadata = _metadata(sources, adapters, told)
     streams = [source.records(until) for source in sources]
     merged = heapq.merge(*streams, key=lambda record: record.stamp.monotonic_ns)
     count = write_whole(out, metadata, (record._replace(sequence=k) for k, record in enumerate(merged)))
-    damage = [f"{s.name}: {s.recording.damaged} damaged places" for s in sources if s.recording.damaged]
-    torn = [f"{s.name}: {s.recording.torn}" for s in sources if s.recording.torn]
-    return [f"{count} records", *told, *damage, *torn]
+    return [f"{count} records", *told]
 
 
 def _opened(recording: Recording, until: Until) -> _Source:

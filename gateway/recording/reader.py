@@ -61,10 +61,15 @@ class Damage(NamedTuple):
 
 @dataclass
 class Findings:
-    """What reading found beside the records: places kept up to a bound, and all of them counted."""
+    """What reading found beside the records: places kept up to a bound, and all of them counted.
+
+    `missing` are the records whose sequences no record has, `back` is how often sequences go back.
+    """
 
     records: int = 0
     damaged: int = 0
+    missing: int = 0
+    back: int = 0
     places: list[Damage] = field(default_factory=list)
     torn: list[tuple[Path, str]] = field(default_factory=list)
 

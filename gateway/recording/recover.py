@@ -17,14 +17,14 @@ def recover(recording: Recording, records: Iterator[Record], out: Path) -> str:
 
     def with_note() -> Iterator[Record]:
         last: Record | None = None
-        missing = again = 0
+        due, missing, again = recording.begins, 0, 0
         surely = -1  # the latest sequence of a raw record, which its CRC vouches for in every format
         for record in records:
             if record.sequence <= surely:
                 again += 1
                 continue
-            missing += max(record.sequence - last.sequence - 1, 0) if last else 0
-            last = record
+            missing += max(record.sequence - due, 0) if due is not None else 0
+            last, due = record, record.sequence + 1
             surely = record.sequence if isinstance(record, Raw) else surely
             yield record
         said[0] = _note(recording, missing, again)
@@ -42,7 +42,7 @@ def _note(recording: Recording, missing: int, again: int) -> str:
     if recording.torn:
         lost.append(recording.torn)
     if missing:
-        lost.append(f"{missing} records are missing between others")
+        lost.append(f"{missing} records are missing before or between others")
     if again:
         lost.append(f"{again} records came again or too late and are left out")
     return f"recovered {recording.records - again} records from {recording.path.name}; " + (

@@ -5,7 +5,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 
-from gateway.chunks import Run
+import numpy as np
+
+from gateway.chunks import SEQUENCE, Chunks, Run
 from gateway.errors import GatewayError
 from gateway.recording.layout import FORMAT_KEY, LAYOUTS, MAGIC
 from gateway.recording.reader import OPENING, Damage, FileReader, Findings
@@ -13,6 +15,7 @@ from gateway.recording.window import Window
 from gateway.records import Record
 
 FOR_METADATA = 1 << 20  # of the beginning of a file
+WRITTEN_BY_COMMANDS = {"cut", "merged", "recovered"}  # metadata of files that no session has
 _FOLLOWER = re.compile(r"(.+)\.(\d{4,})")
 
 
@@ -26,8 +29,8 @@ class Recording:
 
     A file that begins a session stands for all of it, and a directory for the only session in it; a list of files is
     read as it is. An iteration tells how many `records` were whole, how many places were `damaged`, the first of them
-    in `damage`, and in `torn` of each file that does not end as it should. Raises GatewayError for what is missing or
-    is no recording of ours.
+    in `damage`, how many records are `missing`, all `losses` in words, and in `torn` of each file that does not end as
+    it should. Raises GatewayError for what is missing or is no recording of ours.
     """
 
     def __init__(self, source: Path | Sequence[Path]) -> None:
@@ -52,6 +55,33 @@ class Recording:
         return self._found.places
 
     @property
+    def missing(self) -> int:
+        """Records that the sequences of the last iteration say there were, and that did not come."""
+        return self._found.missing
+
+    @property
+    def losses(self) -> list[str]:
+        """What the last iteration found damaged, missing or out of order before the end, in words."""
+        found = self._found
+        counted = (
+            (found.damaged, "damaged place", "damaged places"),
+            (found.missing, "missing record", "missing records"),
+            (found.back, "step back in the order", "steps back in the order"),
+        )
+        return [f"{count} {what if count == 1 else plural}" for count, what, plural in counted if count]
+
+    @property
+    def complaints(self) -> list[str]:
+        """The losses and the torn ends, in words."""
+        return [*self.losses, *([self.torn] if self.torn else [])]
+
+    @property
+    def begins(self) -> int | None:
+        """The sequence of the first record; None of what need not begin where a session does."""
+        whole = self.path.is_dir() or self.metadata.get("file", "1") == "1"
+        return 0 if whole and "cut" not in self.metadata else None
+
+    @property
     def torn(self) -> str:
         """What is to be said of files without their index."""
         return "; ".join(f"{path.name}: {text}" if len(self.files) > 1 else text for path, text in self._found.torn)
@@ -59,7 +89,7 @@ class Recording:
     def runs(self) -> Iterator[Run]:
         """The same records in runs, raw ones as columns."""
         self._found = found = Findings()
-        return chain.from_iterable(_runs(path, found) for path in self.files)
+        return _in_order(chain.from_iterable(_runs(path, found) for path in self.files), found, self.begins)
 
     def __iter__(self) -> Iterator[Record]:
         return chain.from_iterable(self.runs())
@@ -73,6 +103,21 @@ def read_file(path: Path, found: Findings) -> Iterator[Record]:
 def _runs(path: Path, found: Findings) -> Iterator[Run]:
     with Window(path) as window:
         yield from FileReader(path, window, found).runs()
+
+
+def _in_order(runs: Iterable[Run], found: Findings, due: int | None) -> Iterator[Run]:
+    """The runs; to the findings goes whether their sequences count on, from the one that is due if that is known."""
+    for run in runs:
+        yield run
+        if isinstance(run, Chunks):
+            sequence = run.columns[SEQUENCE, : run.given].astype(np.int64)
+        else:
+            sequence = np.array([record.sequence for record in run], np.uint64).astype(np.int64)
+        if len(sequence):
+            steps = np.diff(sequence, prepend=sequence[0] - 1 if due is None else due - 1)
+            found.missing += int(np.maximum(steps - 1, 0).sum())
+            found.back += int(np.count_nonzero(steps < 1))
+            due = int(sequence[-1]) + 1
 
 
 def metadata_of(path: Path) -> dict[str, str]:
@@ -95,13 +140,30 @@ def metadata_of(path: Path) -> dict[str, str]:
 
 
 def sessions(files: Iterable[Path]) -> list[list[Path]]:
-    """Files by the session that they belong to as their names say, each session's in order, whether it is all there."""
+    """Files by the session that they belong to, each session's in order, whether it is all there.
+
+    Names say it, and of a file that follows another its metadata too, if that can be read.
+    """
     found: dict[Path, list[tuple[int, Path]]] = {}
     for file in files:
         match = _FOLLOWER.fullmatch(file.stem)
         first = file.with_name(f"{match[1]}{file.suffix}") if match else file
         found.setdefault(first, []).append((int(match[2]) if match else 1, file))
-    return [[file for _, file in sorted(group)] for _, group in sorted(found.items())]
+    every = []
+    for _, group in sorted(found.items()):
+        first, *rest = (file for _, file in sorted(group))
+        strange = [file for file in rest if not _follows(file, first)]
+        every += [[first, *(file for file in rest if file not in strange)], *([file] for file in strange)]
+    return every
+
+
+def _follows(file: Path, first: Path) -> bool:
+    """Whether a file named like one that follows another is of its session; True if that cannot be read."""
+    try:
+        here, there = metadata_of(file), metadata_of(first)
+    except GatewayError:
+        return True
+    return here.get("session") == there.get("session") and not here.keys() & WRITTEN_BY_COMMANDS
 
 
 def files_of(path: Path) -> list[Path]:

@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from gateway.errors import GatewayError
 from gateway.recording.keeper import NAME
 from gateway.recording.reader import Findings
-from gateway.recording.session import Recording, metadata_of, read_file
+from gateway.recording.session import WRITTEN_BY_COMMANDS, Recording, metadata_of, read_file
 from gateway.records import Note, Record, Status
 
 KEPT = 100  # of the problems; the others are counted
@@ -27,6 +27,12 @@ class Soundness:
     problems: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     _last: Record | None = None
+
+    @property
+    def lacks_its_end(self) -> bool:
+        """Whether the last record is another one than a gateway writes when it ends."""
+        last = self._last
+        return not (isinstance(last, Status) and (last.adapter, last.state) == (NAME, "CLOSED"))
 
     def problem(self, text: str) -> None:
         """Count what is wrong."""
@@ -65,7 +71,7 @@ def verify(recording: Recording, until: Callable[[Iterable[Record]], Iterable[Re
     for place, path in enumerate(recording.files):
         for text in _numbering(recording, place):
             found.problem(text)
-        first = 0 if place == 0 and _begins_at_zero(recording) else None
+        first = None if place else recording.begins
         read = Findings()
         for record in until(read_file(path, read)):
             found.feed(record, path, first)
@@ -76,11 +82,9 @@ def verify(recording: Recording, until: Callable[[Iterable[Record]], Iterable[Re
             found.problem(f"{path}: {text}")
         if not read.torn and not read.damaged and (text := _index(path, read.records)):
             found.problem(f"{path}: {text}")
+    if found.lacks_its_end and "session" in recording.metadata and not recording.metadata.keys() & WRITTEN_BY_COMMANDS:
+        found.remarks.append("the session does not end here: its last record is none of its closing")
     return found
-
-
-def _begins_at_zero(recording: Recording) -> bool:
-    return recording.metadata.get("file", "1") == "1" and "cut" not in recording.metadata
 
 
 def _numbering(recording: Recording, place: int) -> Iterator[str]:

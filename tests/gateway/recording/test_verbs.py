@@ -13,6 +13,7 @@ from gateway.recording import Recorder, Recording
 from gateway.recording.cutting import cut, moment
 from gateway.recording.merging import merge
 from gateway.recording.recover import recover
+from gateway.recording.session import file_of_session, sessions
 from gateway.recording.verify import verify
 from gateway.records import Note, Raw, Record, Stamp, Status
 from tests.gateway.live import replayed
@@ -117,7 +118,7 @@ def test_what_damage_cost_is_in_the_note(tmp_path: Path) -> None:
     recording = Recording(tmp_path / "a.mcap")
     said = recover(recording, iter(recording), tmp_path / "b.mcap")
     assert "recovered 283 records from a.mcap; " in said
-    assert "of a.mcap: the CRC of a raw chunk is wrong; 1 records are missing between others" in said
+    assert "of a.mcap: the CRC of a raw chunk is wrong; 1 records are missing before or between others" in said
 
 
 def test_records_that_come_again_are_recovered_once_and_the_result_is_sound(tmp_path: Path) -> None:
@@ -134,6 +135,82 @@ def test_a_sequence_that_nothing_vouches_for_leaves_no_record_out(tmp_path: Path
     recording = Recording(made(tmp_path / "a.mcap", [raw(0, 0, b"x"), tick(900, 1), raw(2, 2, b"y")]))
     recover(recording, iter(recording), tmp_path / "b.mcap")
     assert [record.sequence for record in Recording(tmp_path / "b.mcap")][:3] == [0, 900, 2]
+
+
+def session(directory: Path, files: int) -> Path:
+    """A session of files with two ticks each, closed as a gateway closes it."""
+    directory.mkdir()
+    first = directory / "s.mcap"
+    describes = describe(check_config({"adapters": [{"name": "bridge", "source": "serial:x"}]}, "test"), None)
+    for number in range(1, files + 1):
+        recorder = Recorder(file_of_session(first, number), {**describes, "session": "s", "file": str(number)})
+        recorder.append([tick(2 * number - 2, 2 * number), tick(2 * number - 1, 2 * number + 1)])
+        if number == files:
+            recorder.append([status(2 * files, 2 * files + 2, "CLOSED", adapter="recording")])
+        recorder.close()
+    return first
+
+
+@pytest.mark.parametrize("verb", ["replay", "dump", "export", "cut", "merge", "recover", "simulate"])
+def test_a_file_that_a_session_lacks_is_told_by_each_command(verb: str, tmp_path: Path) -> None:
+    first = session(tmp_path / "in", 4)
+    file_of_session(first, 3).unlink()
+    assert Recording(first).losses == []  # of what nobody has read yet
+    out = tmp_path / "out.mcap"
+    arguments: dict[str, list[str | Path]] = {
+        "export": ["--to", "csv", "-o", out],
+        "cut": ["-o", out],
+        "merge": ["-o", out],
+        "recover": ["-o", out],
+        "simulate": ["--to", f"file:{out}"],
+    }
+    names = ["--from", first] if verb == "simulate" else [first]
+    done = shadebus(verb, *names, *arguments.get(verb, []))
+    told = done.stdout + done.stderr
+    assert "2 missing records" in told or "2 records are missing" in told, told
+    assert done.returncode == (1 if verb == "replay" else 0)
+    if verb == "merge":
+        assert "s.mcap: 2 missing records" in Recording(out).metadata["merged"]
+
+
+def test_the_first_files_and_the_last_ones_of_a_directory_are_missed_too(tmp_path: Path) -> None:
+    first = session(tmp_path / "in", 4)
+    whole = verify(Recording(tmp_path / "in"))
+    assert (whole.problems, whole.remarks) == ([], ["record 8 says: recording CLOSED: "])
+    file_of_session(first, 4).unlink()
+    cut_short = verify(Recording(tmp_path / "in"))
+    assert cut_short.problems == []
+    assert cut_short.remarks == ["the session does not end here: its last record is none of its closing"]
+    first.unlink()
+    assert "records 0 to 1 are missing" in verify(Recording(tmp_path / "in")).problems[0]
+    recording = Recording(tmp_path / "in")
+    assert "2 records are missing" in recover(recording, iter(recording), tmp_path / "b.mcap")
+
+
+def test_files_that_stand_in_the_wrong_order_are_told(tmp_path: Path) -> None:
+    first = session(tmp_path / "in", 3)
+    recording = Recording([first, file_of_session(first, 3), file_of_session(first, 2)])
+    assert [record.sequence for record in recording] == [0, 1, 4, 5, 6, 2, 3]
+    assert recording.losses == ["2 missing records", "1 step back in the order"]
+
+
+def test_a_file_of_another_recording_is_none_that_follows_whatever_its_name(tmp_path: Path) -> None:
+    session(tmp_path / "one", 1).rename(tmp_path / "flight.mcap")
+    other = made(tmp_path / "flight.2026.mcap", [tick(0, 0)])
+    cut_off = tmp_path / "flight.2027.mcap"
+    cut(Recording(tmp_path / "flight.mcap"), iter(Recording(tmp_path / "flight.mcap")), None, None, cut_off)
+    assert Recording(tmp_path / "flight.mcap").files == [tmp_path / "flight.mcap"]
+    assert sessions(tmp_path.glob("*.mcap")) == [[tmp_path / "flight.mcap"], [other], [cut_off]]
+
+
+def test_a_file_of_a_session_that_cannot_be_read_is_still_its_file(tmp_path: Path) -> None:
+    first = session(tmp_path / "in", 3)
+    second = file_of_session(first, 2)
+    second.write_bytes(b"\x00" * 500)
+    recording = Recording(first)
+    assert recording.files == [first, second, file_of_session(first, 3)]
+    assert len(list(recording)) == 5
+    assert recording.losses == ["2 missing records"]
 
 
 def test_of_several_recordings_each_is_verified_whatever_the_others_are(tmp_path: Path) -> None:
@@ -292,6 +369,10 @@ def test_info_tells_files_format_damage_and_how_the_disk_did(tmp_path: Path) -> 
     (tmp_path / "a.mcap").write_bytes(data)
     text = shadebus("info", tmp_path / "a.mcap").stdout
     rows = {row.split("│")[1].strip(): row.split("│")[2].strip() for row in text.splitlines() if row.startswith("│")}
-    assert (rows["files"], rows["format"], rows["records"]) == ("a.mcap", "2", "283 whole, 1 damaged places")
+    assert (rows["files"], rows["format"], rows["records"]) == (
+        "a.mcap",
+        "2",
+        "283 whole, 1 damaged place, 1 missing record",
+    )
     assert "of a.mcap: the CRC of a raw chunk is wrong" in rows["damage"]
     assert rows["disk"] == "nothing told"
