@@ -16,6 +16,7 @@ MAGIC = b"\x89MCAP0\r\n"
 PROFILE = "shadebus"
 FORMAT = "2"  # what is written today
 LARGEST_RECORD = 16 << 20  # far above any chunk: a torn length must not ask for gigabytes
+LARGEST_DESCRIPTION = 4 << 20  # of channels, metadata and JSON
 RAW_HEAD = struct.Struct("<QQQI")  # sequence, monotonic_ns, utc_ns, dropped_before; the chunk follows
 RAW_ENCODING, JSON_ENCODING = "x-shadebus-raw", "json"
 KINDS: dict[str, type[Status] | type[Tick] | type[Note]] = {"/status": Status, "/tick": Tick, "/note": Note}

@@ -17,8 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gateway.chunks import COLUMNS, MONOTONIC_NS, NUMBER, UTC_NS, Chunks, Run
+from gateway.recording import index
 from gateway.recording.kernels import CHANNELS, KNOWN, MESSAGE, RAW_BYTES, raw_records
 from gateway.recording.layout import (
+    LARGEST_DESCRIPTION,
     LARGEST_RECORD,
     MAGIC,
     PROFILE,
@@ -34,7 +36,6 @@ from gateway.records import Raw, Record, Stamp
 AT_ONCE = 4096  # raw records
 KEPT_PLACES = 100  # of the damaged places; the others are counted
 SPENT_PER_BYTE = 16  # bytes of CRC for each byte passed over
-LARGEST_DESCRIPTION = 4 << 20  # of channels, metadata and JSON
 HEADER, CHANNEL, METADATA, DATA_END = 1, 4, 12, 15
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
@@ -94,6 +95,7 @@ class FileReader:
         self._window = window
         self._found = found
         self._topics: dict[int, Topic] = {}
+        self._listed: dict[int, Topic] | None = None  # by the index, once anybody has asked
         self._adapters: dict[int, str] = {}  # of raw channels
         self._seeds = np.zeros(CHANNELS, np.int64)
         self._columns = np.empty((COLUMNS, AT_ONCE), np.uint64)
@@ -162,11 +164,7 @@ class FileReader:
             return end, self._message(at, length)
         content = window.get(at, _RECORD.size + min(length, LARGEST_DESCRIPTION))[_RECORD.size :]
         if opcode == CHANNEL:
-            number, topic = parse_channel(content)
-            self._topics[number] = topic
-            if topic.adapter is not None:
-                self._adapters[number] = topic.adapter
-                self._seeds[number] = KNOWN | topic.seed
+            self._know(*parse_channel(content))
         elif opcode == METADATA:
             self.metadata = parse_metadata(content)
         elif opcode == DATA_END and content == bytes(4):
@@ -181,7 +179,7 @@ class FileReader:
         if size < 0 or len(head) < _MESSAGE.size:
             raise Implausible("a message is too short")
         _, _, number, low, log_ns, published_ns = _MESSAGE.unpack(head)
-        topic = self._topics.get(number)
+        topic = self._topics.get(number) or self._from_index(number)
         if topic is None:
             raise Implausible(f"nothing says what channel {number} is")
         if log_ns != published_ns:
@@ -195,6 +193,20 @@ class FileReader:
         if (record.sequence & 0xFFFFFFFF, record.stamp.utc_ns) != (low, log_ns):
             raise DamagedRecord("the header of a message says another time or sequence than the message")
         return record
+
+    def _know(self, number: int, topic: Topic) -> None:
+        self._topics[number] = topic
+        if topic.adapter is not None:
+            self._adapters[number] = topic.adapter
+            self._seeds[number] = KNOWN | topic.seed
+
+    def _from_index(self, number: int) -> Topic | None:
+        """A channel whose description in the data is lost."""
+        if self._listed is None:
+            self._listed = index.topics(self._window)
+        if topic := self._listed.get(number):
+            self._know(number, topic)
+        return topic
 
     def _skip(self, at: int, why: DamagedRecord) -> int:
         """Where the next whole record begins behind a damaged place, which is told, or the end."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from gateway.chunks import SEQUENCE, Chunks, Run
 from gateway.errors import GatewayError
+from gateway.recording import index
 from gateway.recording.layout import FORMAT_KEY, LAYOUTS, MAGIC
 from gateway.recording.reader import OPENING, Damage, FileReader, Findings
 from gateway.recording.window import Window
@@ -127,16 +128,17 @@ def metadata_of(path: Path) -> dict[str, str]:
         opening = window.get(0, len(OPENING))
         reader = FileReader(path, window, Findings())
         next(reader.records(), None)
-    if not reader.metadata and opening != OPENING:
+        metadata = reader.metadata or index.metadata(window)
+    if not metadata and opening != OPENING:
         if window.size < len(OPENING):
             raise GatewayError(f"{path} is not a shadebus recording: it ends before its first record")
         if opening.startswith(MAGIC):
             raise GatewayError(f"{path} is an MCAP file, but not a shadebus recording")
-        raise GatewayError(f"{path} is not a shadebus recording: it is no MCAP file; look for another copy")
-    version = reader.metadata.get(FORMAT_KEY, "1")
+        raise GatewayError(f"{path} is not a shadebus recording: it does not begin as an MCAP file, and no index says more; look for another copy")
+    version = metadata.get(FORMAT_KEY, "1")
     if version not in LAYOUTS:
         raise GatewayError(f"{path} is of format {version}, which a later version of shadebus wrote: update shadebus")
-    return reader.metadata
+    return metadata
 
 
 def sessions(files: Iterable[Path]) -> list[list[Path]]:

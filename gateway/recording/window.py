@@ -21,13 +21,14 @@ _DATA_END = b"\x0f\x04" + bytes(11)  # opcode, length, and no CRC-32 of the data
 class Window:
     """Bytes of a file: `data` begins at `base` and moves forward; nothing behind `end` is seen.
 
-    `closed` says whether the file has a sound index; `end` is then the end of the data before it. Raises GatewayError
-    for a file that cannot be read.
+    `closed` says whether the file has a sound `index`; `end` is then the end of the data before it. Raises
+    GatewayError for a file that cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
         self.base = 0
         self.data = b""
+        self.index = b""
         self._path = path
         try:
             self._file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
@@ -36,7 +37,7 @@ class Window:
         try:
             self.size = os.fstat(self._file).st_size
             start = self._index_start()
-            ends_with_magic = self._read(max(self.size - len(MAGIC), 0), len(MAGIC)) == MAGIC
+            ends_with_magic = self.read(max(self.size - len(MAGIC), 0), len(MAGIC)) == MAGIC
         except BaseException:
             os.close(self._file)
             raise
@@ -71,13 +72,14 @@ class Window:
         end = min(end, self.end)
         have = self.base + len(self.data)
         if end > have:
-            more = self._read(have, min(max(end - have, BLOCK), self.end - have))
+            more = self.read(have, min(max(end - have, BLOCK), self.end - have))
             self.data = self.data[at - self.base :] + more
             self.base = at
             if have + len(more) < end:  # the file has become shorter
                 self.end = have + len(more)
 
-    def _read(self, at: int, count: int) -> bytes:
+    def read(self, at: int, count: int) -> bytes:
+        """Bytes from anywhere, without moving; fewer at the end of the file."""
         try:
             return os.pread(self._file, count, at)
         except OSError as error:
@@ -88,12 +90,13 @@ class Window:
         begin = self.size - _FOOTER.size
         if begin < 0:
             return None
-        opcode, length, start, _, crc, magic = _FOOTER.unpack(self._read(begin, _FOOTER.size))
+        opcode, length, start, _, crc, magic = _FOOTER.unpack(self.read(begin, _FOOTER.size))
         if (opcode, length, magic) != (_FOOTER_OPCODE, _FOOTER_LENGTH, MAGIC) or not 0 < self.size - start < MOST_INDEX:
             return None
-        section = self._read(start, self.size - start)
+        section = self.read(start, self.size - start)
         if zlib.crc32(section[: -len(MAGIC) - 4]) != crc:
             return None
+        self.index = section
         begin = int(start)
-        ended = begin >= len(_DATA_END) and self._read(begin - len(_DATA_END), len(_DATA_END)) == _DATA_END
+        ended = begin >= len(_DATA_END) and self.read(begin - len(_DATA_END), len(_DATA_END)) == _DATA_END
         return begin - len(_DATA_END) if ended else begin

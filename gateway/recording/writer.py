@@ -90,8 +90,9 @@ class Recorder:
             self._sink = _Sink(path)
             self._writer = Writer(self._sink, use_chunking=False)  # type: ignore[arg-type] # needs write and tell only
             self._writer.start(profile=PROFILE, library=PROFILE)
+            self._metadata = guarded(PROFILE, metadata)
             for _ in range(2):  # a damaged byte spoils one of them
-                self._writer.add_metadata(PROFILE, guarded(PROFILE, metadata))
+                self._writer.add_metadata(PROFILE, self._metadata)
             self._sink.commit()
         except OSError as error:
             raise GatewayError(f"cannot record to {path}: {error.strerror}; choose another directory") from error
@@ -133,7 +134,8 @@ class Recorder:
                     os.close(directory)
 
     def close(self) -> None:
-        """Write the index and close. A file without it stays readable."""
+        """Write the metadata once more, as the beginning may be lost, and the index; close. Neither need be there."""
+        self._writer.add_metadata(PROFILE, self._metadata)
         self._writer.finish()  # type: ignore[no-untyped-call] # the library leaves it so
         self._sink.commit()
         self.sync()

@@ -194,6 +194,21 @@ def test_files_that_stand_in_the_wrong_order_are_told(tmp_path: Path) -> None:
     assert recording.losses == ["2 missing records", "1 step back in the order"]
 
 
+@pytest.mark.parametrize("lost", [600, 2048, 4096, 8192])
+def test_a_closed_recording_whose_beginning_is_lost_is_read_from_there_on(lost: int, tmp_path: Path) -> None:
+    records = [raw(k, k, bytes([k % 256]) * 90, adapter=("bridge", "left")[k % 2]) for k in range(200)]
+    whole = Recording(made(tmp_path / "a.mcap", [*records, tick(200, 200)]))
+    spoilt = tmp_path / "b.mcap"
+    spoilt.write_bytes(bytes(lost) + whole.path.read_bytes()[lost:])
+    found = Recording(spoilt)
+    assert found.metadata == whole.metadata
+    rest = list(found)
+    assert rest == [*records, tick(200, 200)][201 - len(rest) :]
+    assert len(rest) > 100
+    assert found.damaged == 1
+    assert found.missing == 201 - len(rest)
+
+
 def test_a_file_of_another_recording_is_none_that_follows_whatever_its_name(tmp_path: Path) -> None:
     session(tmp_path / "one", 1).rename(tmp_path / "flight.mcap")
     other = made(tmp_path / "flight.2026.mcap", [tick(0, 0)])
