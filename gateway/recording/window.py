@@ -83,7 +83,8 @@ class Window:
         try:
             return os.pread(self._file, count, at)
         except OSError as error:
-            raise GatewayError(f"cannot read recording {self._path} at byte {at}: {error.strerror}") from error
+            what = f"cannot read recording {self._path} at byte {at}: {error.strerror}"
+            raise GatewayError(f"{what}; copy what its disk still gives, with ddrescue, and read the copy") from error
 
     def _index_start(self) -> int | None:
         """Where the data ends before an index whose CRC-32 is right; that of the footer covers all but the magic."""
