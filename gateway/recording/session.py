@@ -134,7 +134,8 @@ def metadata_of(path: Path) -> dict[str, str]:
             raise GatewayError(f"{path} is not a shadebus recording: it ends before its first record")
         if opening.startswith(MAGIC):
             raise GatewayError(f"{path} is an MCAP file, but not a shadebus recording")
-        raise GatewayError(f"{path} is not a shadebus recording: it does not begin as an MCAP file, and no index says more; look for another copy")
+        why = "it does not begin as an MCAP file, and no index says more; look for another copy"
+        raise GatewayError(f"{path} is not a shadebus recording: {why}")
     version = metadata.get(FORMAT_KEY, "1")
     if version not in LAYOUTS:
         raise GatewayError(f"{path} is of format {version}, which a later version of shadebus wrote: update shadebus")
