@@ -115,7 +115,7 @@ def _in_order(runs: Iterable[Run], found: Findings, due: int | None) -> Iterator
         else:
             sequence = np.array([record.sequence for record in run], np.uint64).astype(np.int64)
         if len(sequence):
-            steps = np.diff(sequence, prepend=sequence[0] - 1 if due is None else due - 1)
+            steps = np.diff(sequence, prepend=(sequence[0] if due is None else due) - 1)
             found.missing += int(np.maximum(steps - 1, 0).sum())
             found.back += int(np.count_nonzero(steps < 1))
             due = int(sequence[-1]) + 1
