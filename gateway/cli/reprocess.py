@@ -42,14 +42,15 @@ def reprocess(
     with Progress(console=plain_console(), transient=True) as bar:
         task = bar.add_task("recordings", total=len(listed))
         done = bring_up_to_date(listed, data, scheduler, lambda n, total: bar.update(task, completed=n, total=total))
-    rows = data.summary() if done.kept or done.made else []
+    rows, damaged = data.summary()
     headings = ("recording", "seconds", "ok", "alert", "unavailable", "damaged", "torn")
     print_table(headings, [[_text(row[name]) for name in headings] for row in rows])
     typer.echo(f"{len(done.made)} worked out, {done.kept} held already")
-    if others := data.others({job.name for job in listed}):
+    if others := sorted(set(data.names()) - {job.name for job in listed}):
         typer.echo(f"results of recordings that are not below {directory} are left: {', '.join(others)}")
     problems = [f"{name}: {why}" for name, why in done.failed.items()]
     problems += [f"{row['recording']}: {failure}" for row in rows for failure in row["failures"]]
+    problems += [f"{name}: its result cannot be read; delete {output}/*/{name}.parquet" for name in damaged]
     if problems:
         raise GatewayError("; ".join(problems))
 

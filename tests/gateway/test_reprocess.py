@@ -13,6 +13,7 @@ from pathlib import Path
 
 import duckdb
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -24,7 +25,7 @@ from gateway.recording import Recording
 from gateway.replay import replay
 from gateway.reprocess import work as work_module
 from gateway.reprocess.dataset import DataSet
-from gateway.reprocess.job import Job, jobs
+from gateway.reprocess.job import Job, Outcome, jobs
 from gateway.reprocess.run import reprocess
 from gateway.reprocess.work import key, work
 from monitor.calibration import uncalibrated
@@ -67,7 +68,7 @@ def test_the_verdicts_of_a_recording_are_those_of_its_replay(flights: Path) -> N
 
 def test_results_land_in_one_data_set_that_others_can_query(flights: Path, tmp_path: Path) -> None:
     run = shadebus("reprocess", flights, "-o", tmp_path / "out")
-    assert run.returncode == 0, run.stderr
+    assert (run.returncode, run.stderr) == (0, "")
     assert f"{COUNT} worked out, 0 held already" in run.stdout
     found = duckdb.sql(
         f"select recording, count(*) from '{tmp_path}/out/verdicts/**/*.parquet' group by recording order by recording"
@@ -78,10 +79,111 @@ def test_results_land_in_one_data_set_that_others_can_query(flights: Path, tmp_p
     assert f"0 worked out, {COUNT} held already" in again.stdout
 
 
-def bring_up(listed: list[Job], data: DataSet, scheduler: str | None = None) -> list[str]:
-    done = reprocess(listed, data, scheduler, lambda _n, _of: None)
-    assert done.failed == {}
-    return done.made
+def test_recordings_are_in_the_table_and_the_data_set_whatever_their_names_begin_with(
+    flights: Path, tmp_path: Path
+) -> None:
+    names = [".hidden/a", ".b", "_old/c", "_d", "e.parquet/f.part"]
+    for name in names:
+        path = tmp_path / "in" / f"{name}.mcap"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.symlink_to(flights / "flight0.mcap")
+    run = shadebus("reprocess", tmp_path / "in", "-o", tmp_path / "out")
+    assert (run.returncode, run.stderr) == (0, "")
+    cells = [[cell.strip() for cell in line.split("|")] for line in run.stdout.splitlines()]
+    assert {row[1]: sum(map(int, row[3:6])) for row in cells if row[1:] and row[1] in names} == dict.fromkeys(names, 2)
+    found = duckdb.sql(f"select recording, count(*) from '{tmp_path}/out/verdicts/**/*.parquet' group by recording")
+    assert found is not None
+    assert dict(found.fetchall()) == dict.fromkeys(names, 2)
+
+
+@pytest.fixture(scope="module")
+def outcome(flights: Path) -> Outcome:
+    return work(Job("flight", (flights / "flight0.mcap",)))
+
+
+def holds(data: DataSet, outcome: Outcome) -> bool:
+    return data.has("flight", lambda: outcome.whole["key"])
+
+
+def columns_of(path: Path) -> "list[pq.ColumnChunkMetaData]":
+    group = pq.read_metadata(path).row_group(0)
+    return [group.column(index) for index in range(group.num_columns)]
+
+
+@pytest.mark.parametrize("table", ["recordings", "verdicts"])
+@pytest.mark.parametrize("damage", ["gone", "empty", "zeros", "cut", "another table", "a bit"])
+def test_a_result_that_cannot_be_read_counts_as_none_and_is_named_until_it_is_made_anew(
+    outcome: Outcome, tmp_path: Path, table: str, damage: str
+) -> None:
+    data, path = DataSet(tmp_path), tmp_path / table / "flight.parquet"
+    data.put("flight", outcome)
+    assert holds(data, outcome)
+    whole = path.read_bytes()
+    column = next(column for column in columns_of(path) if column.path_in_schema in ("key", "verdict"))
+    at = column.data_page_offset + column.total_compressed_size - 1
+    flipped = whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :]
+    damaged = {"empty": b"", "zeros": bytes(len(whole)), "cut": whole[:-1], "a bit": flipped}
+    if damage == "gone":
+        path.unlink()
+    elif damage == "another table":
+        pq.write_table(pa.table({"recording": ["flight"]}), path)
+    else:
+        path.write_bytes(damaged[damage])
+    assert not holds(data, outcome)
+    assert data.summary() == ([], ["flight"])
+
+    data.put("flight", outcome)
+    assert holds(data, outcome)
+    ((row,), damaged_now) = data.summary()
+    assert (row["recording"], damaged_now) == ("flight", [])
+
+
+def test_what_was_left_half_written_is_no_result_and_in_nobodys_way(outcome: Outcome, tmp_path: Path) -> None:
+    for table in ("recordings", "verdicts"):
+        (tmp_path / table).mkdir()
+        (tmp_path / table / "flight.part").write_bytes(b"half" * 25)
+    data = DataSet(tmp_path)
+    assert (data.names(), data.summary()) == ([], ([], []))
+    data.put("flight", outcome)
+    assert holds(data, outcome)
+
+
+def test_a_result_is_on_the_disk_before_its_name_is(
+    outcome: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[tuple[str, int]] = []
+
+    def note(fd: int) -> None:
+        path = Path(f"/proc/self/fd/{fd}").readlink()
+        assert not path.with_suffix(".parquet").exists()
+        synced.append((path.parent.name, path.stat().st_size))
+
+    monkeypatch.setattr(os, "fsync", note)
+    DataSet(tmp_path).put("flight", outcome)
+    assert synced == [
+        (table, (tmp_path / table / "flight.parquet").stat().st_size) for table in ("verdicts", "recordings")
+    ]
+
+
+def test_a_damaged_result_of_a_recording_that_is_gone_is_named_with_the_mend(
+    flights: Path, outcome: Outcome, tmp_path: Path
+) -> None:
+    data = DataSet(tmp_path)
+    for name in ("gone", "flight0"):
+        data.put(name, outcome)
+        (tmp_path / "recordings" / f"{name}.parquet").write_bytes(b"")
+    run = shadebus("reprocess", flights / "flight0.mcap", "-o", tmp_path)
+    assert run.returncode == 1
+    assert "1 worked out, 0 held already" in run.stdout
+    assert run.stderr == f"shadebus: gone: its result cannot be read; delete {tmp_path}/*/gone.parquet\n"
+
+
+def test_an_output_that_is_a_file_is_refused_before_any_work(flights: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for output in (tmp_path / "file", tmp_path / "file/below"):
+        run = shadebus("reprocess", flights, "-o", output)
+        assert (run.returncode, run.stdout) == (1, "")
+        assert run.stderr == f"shadebus: cannot write {output}: Not a directory; choose another place with -o\n"
 
 
 def test_only_what_is_new_or_has_changed_is_done_again(
