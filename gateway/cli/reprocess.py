@@ -19,8 +19,11 @@ def reprocess(
     The verdicts land in a Parquet data set. A second run does only what is new or has changed: the recording, the
     configuration, the terrain, the water, or this program.
     """
+    import logging
+
     from gateway.reprocess.workers import get_ready
 
+    logging.disable()  # whatever Dask says of its processes: what counts is told of each recording
     if not scheduler:
         get_ready()  # before all the rest is imported, which takes as long
 

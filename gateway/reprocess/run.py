@@ -1,6 +1,5 @@
 """Hand the recordings out to workers and keep what comes back; a worker that dies costs time and nothing else."""
 
-import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Final, NamedTuple
@@ -18,7 +17,7 @@ LOCAL: Final = {
     "threads_per_worker": 1,
     "dashboard_address": None,
     "host": "127.0.0.1",
-    "silence_logs": logging.ERROR,  # that a worker took its time to end is nobody's concern
+    "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"},  # or a second run is told that the port is taken
 }
 SETTINGS: Final = {
     "distributed.worker.multiprocessing-method": "forkserver",
@@ -99,8 +98,11 @@ def _client(scheduler: str | None, most: int) -> Iterator[Client]:
     if scheduler:
         try:
             client = Client(scheduler, timeout="10s")
-        except OSError as error:
-            raise GatewayError(f"no Dask scheduler answers at {scheduler}: {error}: start dask scheduler") from error
+        except (OSError, TypeError, ValueError) as error:
+            raise GatewayError(
+                f"no Dask scheduler answers at {scheduler}: {error}; start dask scheduler and give the address that it "
+                "prints, such as tcp://127.0.0.1:8786"
+            ) from error
         with client:
             yield client
     else:

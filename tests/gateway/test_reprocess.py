@@ -3,10 +3,12 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -31,7 +33,8 @@ from gateway.reprocess.work import key, work
 from monitor.calibration import uncalibrated
 from simulators.scenario import BUILT_IN_TERRAIN
 from tests.gateway.flown import record_flight
-from tests.gateway.shell import shadebus
+from tests.gateway.live import wait_until
+from tests.gateway.shell import GATEWAY, shadebus
 
 COUNT = 4
 
@@ -186,6 +189,29 @@ def test_an_output_that_is_a_file_is_refused_before_any_work(flights: Path, tmp_
         assert run.stderr == f"shadebus: cannot write {output}: Not a directory; choose another place with -o\n"
 
 
+def test_another_program_on_the_port_of_a_dask_dashboard_is_no_concern(flights: Path, tmp_path: Path) -> None:
+    with socket.socket() as other:
+        with suppress(OSError):  # then it is taken already
+            other.bind(("127.0.0.1", 8787))
+        run = shadebus("reprocess", flights / "flight0.mcap", "-o", tmp_path)
+    assert (run.returncode, run.stderr) == (0, "")
+
+
+def test_ctrl_c_ends_all_processes_without_a_word_and_another_run_does_the_rest(flights: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [*GATEWAY, "reprocess", str(flights), "-o", str(out)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as process:
+        wait_until(lambda: any(out.rglob("recordings/**/*.parquet")) or process.poll() is not None, "a result")
+        os.killpg(process.pid, signal.SIGINT)
+        _, errors = process.communicate()  # until the last process that has them open has ended
+    assert (process.returncode, errors) == (-signal.SIGINT, b"")
+    again = shadebus("reprocess", flights, "-o", out)
+    assert (again.returncode, again.stderr) == (0, "")
+    made, held = (int(part.split()[0]) for part in again.stdout.splitlines()[-1].split(", "))
+    assert made + held == COUNT
+    assert held
+
+
 def test_only_what_is_new_or_has_changed_is_done_again(
     flights: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -331,6 +357,16 @@ def test_a_directory_without_recordings_and_a_scheduler_that_is_not_there_are_na
     alone = shadebus("reprocess", flights, "-o", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:9")
     assert "no Dask scheduler answers at tcp://127.0.0.1:9" in alone.stderr
     assert (empty.returncode, alone.returncode) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    "address", ["nonsense", "tcp://", "tcp://127.0.0.1:x", "http://127.0.0.1:9", "tls://127.0.0.1:9"]
+)
+def test_an_address_that_can_be_no_scheduler_is_refused_with_the_mend(
+    flights: Path, tmp_path: Path, address: str
+) -> None:
+    with pytest.raises(GatewayError, match=rf"answers at {address}: .*; start dask scheduler and give the address"):
+        reprocess(jobs(flights, None, ()), DataSet(tmp_path), address, lambda _n, _of: None)
 
 
 class Cluster:
