@@ -46,7 +46,7 @@ def reprocess(
         task = bar.add_task("recordings", total=len(listed))
         done = bring_up_to_date(listed, data, scheduler, lambda n, total: bar.update(task, completed=n, total=total))
     rows, damaged = data.summary()
-    headings = ("recording", "seconds", "ok", "alert", "unavailable", "damaged", "torn")
+    headings = ("recording", "seconds", "ok", "alert", "unavailable", "damaged", "missing", "torn")
     print_table(headings, [[_text(row[name]) for name in headings] for row in rows])
     typer.echo(f"{len(done.made)} worked out, {done.kept} held already")
     if others := sorted(set(data.names()) - {job.name for job in listed}):

@@ -27,6 +27,7 @@ RECORDINGS = pa.schema(
         ("seconds", pa.float64()),
         ("records", pa.int64()),
         ("damaged", pa.int64()),
+        ("missing", pa.int64()),
         ("torn", pa.string()),
         ("failures", pa.list_(pa.string())),
         ("counters", pa.list_(pa.struct([("name", pa.string()), ("count", pa.int64())]))),
@@ -34,7 +35,7 @@ RECORDINGS = pa.schema(
 )
 ANSWERS = ("ok", "alert", "unavailable")
 TABLES = ("recordings", "verdicts")
-SAID = ["key", "seconds", "damaged", "torn", "failures"]  # of a recording, in the summary
+SAID = ["key", "seconds", "damaged", "missing", "torn", "failures"]  # of a recording, in the summary
 
 
 class DataSet:

@@ -78,6 +78,7 @@ def work(job: Job) -> Outcome:
         "seconds": (last.monotonic_ns - first.monotonic_ns) / 1e9 if first and last else 0.0,
         "records": recording.records,
         "damaged": recording.damaged,
+        "missing": recording.missing,
         "torn": recording.torn,
         "failures": failures,
         "counters": [{"name": name, "count": count} for name, count in counters.items()],
