@@ -375,7 +375,7 @@ class Cluster:
     def __init__(self, directory: Path) -> None:
         self.file = directory / "scheduler.json"
         self.processes = [self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")]
-        while not self.file.exists():
+        while not self.file.exists() or not self.file.stat().st_size:  # it is there before what it says
             time.sleep(0.05)
         self.address: str = json.loads(self.file.read_text())["address"]
         worker = ("worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1")
