@@ -2,9 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
 from heapq import merge
-from itertools import islice
 from pathlib import Path
 
 from decoders import formats as f
@@ -18,10 +16,9 @@ from gateway.imports.plan import Wish, rack_of
 from gateway.imports.records import CHUNK_NS, SHARED_NS, Records
 from gateway.link import FLAG_NAMES
 from gateway.metadata import build_monitor, describe
-from gateway.recording import Recorder
+from gateway.recording.whole import write_whole
 from gateway.records import Raw, Record
 
-BATCH = 256
 UTC_UNKNOWN = "the files say no UTC and --start-utc is not given: stamps count from 1970-01-01"
 ASSUMED = {
     "seqrecord": "{tick_ns} ns a tick of the card's clock; the high byte of activity is the channel",
@@ -54,18 +51,15 @@ def import_files(wish: Wish, out: Path, obey: Callable[[Iterable[Record]], Itera
     chunk_ns = SHARED_NS if merged else CHUNK_NS
     maker = Records([*names], start_utc_ns, stamped=bool(interfaces), chunk_ns=chunk_ns)
     books = {adapter.name: Books(form_of(adapter).framer()) for adapter in config.adapters}
-    recorder = Recorder(out, describe(config, build_monitor(config)))
-    try:
-        made = maker.made(_pieces(config, sources, interfaces), opening)
-        _write(recorder, obey(made), books)
-        recorder.append([maker.note(source.told) for source in sources])
-        recorder.close()
-    except BaseException as error:
-        with suppress(OSError):
-            out.unlink()  # what is not whole would look as if it were
-        if isinstance(error, OSError):
-            raise GatewayError(f"cannot write {out}: {error.strerror}; choose another place") from error
-        raise
+
+    def all_there_is() -> Iterator[Record]:
+        for record in obey(maker.made(_pieces(config, sources, interfaces), opening)):
+            if isinstance(record, Raw):
+                books[record.adapter].take(record.data)
+            yield record
+        yield from [maker.note(source.told) for source in sources]
+
+    write_whole(out, describe(config, build_monitor(config)), all_there_is())
     clock = {"steps_back_in_time": maker.clock.steps_back, "clocks_begun_anew": maker.clock.begun_anew}
     return clock | {f"{name}.{key}": n for name, book in books.items() for key, n in book.counters().items()}
 
@@ -126,11 +120,3 @@ def _pieces(config: RackConfig, sources: list[Source], interfaces: dict[str, str
     pairs = zip(config.adapters, sources, strict=True)
     files = [cut([source], adapter.name, record_framer(adapter)) for adapter, source in pairs]
     return merge(*files, key=lambda piece: piece.time_ns or 0)
-
-
-def _write(recorder: Recorder, records: Iterator[Record], books: Mapping[str, Books]) -> None:
-    while batch := [*islice(records, BATCH)]:
-        recorder.append(batch)
-        for record in batch:
-            if isinstance(record, Raw):
-                books[record.adapter].take(record.data)

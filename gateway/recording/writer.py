@@ -88,14 +88,24 @@ class Recorder:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._sink = _Sink(path)
+            self._begin(metadata)
+        except OSError as error:
+            raise GatewayError(f"cannot record to {path}: {error.strerror}; choose another directory") from error
+
+    def _begin(self, metadata: dict[str, str]) -> None:
+        """Write what every file begins with, or leave no file: an empty one would keep its name from the next try."""
+        try:
             self._writer = Writer(self._sink, use_chunking=False)  # type: ignore[arg-type] # needs write and tell only
             self._writer.start(profile=PROFILE, library=PROFILE)
             self._metadata = guarded(PROFILE, metadata)
             for _ in range(2):  # a damaged byte spoils one of them
                 self._writer.add_metadata(PROFILE, self._metadata)
             self._sink.commit()
-        except OSError as error:
-            raise GatewayError(f"cannot record to {path}: {error.strerror}; choose another directory") from error
+        except BaseException:
+            self._sink.close()
+            with contextlib.suppress(OSError):
+                self.path.unlink()
+            raise
 
     @property
     def size(self) -> int:

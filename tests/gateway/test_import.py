@@ -289,7 +289,7 @@ def test_the_command_tells_what_it_found_and_overwrites_nothing(tmp_path: Path) 
     before = (tmp_path / "out.mcap").read_bytes()
     again = shadebus(*command)
     assert again.returncode == 1
-    assert "out.mcap: File exists" in again.stderr
+    assert "out.mcap is there already: name another file with -o" in again.stderr
     assert (tmp_path / "out.mcap").read_bytes() == before
 
 
@@ -309,8 +309,8 @@ def test_a_disk_that_is_full_is_named_and_nothing_half_is_left(tmp_path: Path, m
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("gateway.imports.run.Recorder.append", full)
-    with pytest.raises(GatewayError, match=r"cannot write .*out\.mcap: No space left on device; choose another"):
+    monkeypatch.setattr("gateway.recording.whole.Recorder.append", full)
+    with pytest.raises(GatewayError, match=r"cannot write .*out\.mcap: No space left on device; make room"):
         imported(tmp_path, "rdr4b", bytes(218))
     assert not (tmp_path / "out.mcap").exists()
 

@@ -162,6 +162,27 @@ def test_a_start_below_the_reserve_names_directory_room_and_mend(tmp_path: Path)
 
 
 @needs_mount
+def test_a_start_or_a_rotation_on_a_full_disk_leaves_no_empty_file_and_may_be_tried_again(
+    tmp_path: Path, impatient: None
+) -> None:
+    with small_disk(tmp_path / "disk", 1) as disk:
+        ballast = fill(disk, 0)
+        with pytest.raises(GatewayError, match=r"cannot record to .*\.mcap: No space left on device; choose another"):
+            Bench(disk)
+        assert [*disk.iterdir()] == [ballast]
+        ballast.unlink()
+        with bench(disk, rotate_mib=0.019) as b:
+            b.keep(1)
+            ballast = fill(disk, 3 * 4096)  # pages that the next record takes, and none for a file more
+            b.keep(1)
+            assert b.states == ["NOT_ROTATED"]
+            ballast.unlink()
+            b.keep(2)
+            assert b.states == ["NOT_ROTATED"] and b.kept() == [0, 1, 2, 3]
+        assert len(Recording(b.keeper.path).files) == 2
+
+
+@needs_mount
 def test_below_the_reserve_recording_stops_and_goes_on_in_a_new_file_when_there_is_room(
     tmp_path: Path, impatient: None
 ) -> None:

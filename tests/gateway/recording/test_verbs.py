@@ -8,6 +8,8 @@ import pytest
 
 from gateway.config import check_config
 from gateway.errors import GatewayError
+from gateway.imports.plan import Wish
+from gateway.imports.run import import_files
 from gateway.metadata import describe, recorded_config
 from gateway.recording import Recorder, Recording
 from gateway.recording.cutting import cut, moment
@@ -18,7 +20,9 @@ from gateway.recording.verify import verify
 from gateway.records import Note, Raw, Record, Stamp, Status
 from tests.gateway.live import replayed
 from tests.gateway.made import UTC_NS, raw, stamp, status, tick
+from tests.gateway.recording.disks import fill, needs_mount, small_disk
 from tests.gateway.shell import shadebus
+from tests.gateway.vendor_files import rdr4b
 from tests.golden.make import HERE
 
 GOLDEN = HERE / "format2.mcap"
@@ -260,6 +264,35 @@ def test_half_a_recording_is_not_left_behind(tmp_path: Path) -> None:
     with pytest.raises(SystemExit):
         recover(recording, (stopped() if k > 5 else record for k, record in enumerate(recording)), tmp_path / "b.mcap")  # type: ignore[misc] # it never gives that
     assert [*tmp_path.iterdir()] == []
+
+
+@needs_mount
+def test_a_disk_that_is_full_from_the_beginning_is_left_as_it_was_and_the_name_stays_free(tmp_path: Path) -> None:
+    path = made(tmp_path / "a.mcap", [tick(0, 0), tick(1, 1)])
+    (tmp_path / "in.bin").write_bytes(rdr4b((0, 0, bytes(200))))
+    recording = Recording(path)
+    work: list[Callable[[Path], object]] = [
+        lambda out: recover(recording, iter(recording), out),
+        lambda out: cut(recording, recording, None, 1.0, out),
+        lambda out: merge([recording], out),
+        lambda out: import_files(Wish([tmp_path / "in.bin"], "rdr4b"), out, iter),
+    ]
+    with small_disk(tmp_path / "disk", 1) as disk:
+        for write in work:
+            ballast = fill(disk, 0)
+            with pytest.raises(GatewayError, match="new: No space left on device"):
+                write(disk / "new")
+            assert [*disk.iterdir()] == [ballast]
+            ballast.unlink()
+            write(disk / "new")
+            assert verify(Recording(disk / "new")).problems == []
+            (disk / "new").unlink()
+
+
+def test_a_link_to_nothing_is_a_name_that_is_taken(tmp_path: Path) -> None:
+    (tmp_path / "new").symlink_to(tmp_path / "nothing")
+    with pytest.raises(GatewayError, match="new is there already: name another file with -o"):
+        merge([Recording(GOLDEN)], tmp_path / "new")
 
 
 BOTH = [
