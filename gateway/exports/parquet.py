@@ -1,5 +1,6 @@
 """Parquet: a directory of tables, labels, radials, disparities and verdicts, in row groups of bounded size."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -68,9 +69,13 @@ class Table:
     def __enter__(self) -> "Table":
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._flush()
-        self._writer.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self._flush()
+            self._writer.close()
+            return
+        with suppress(OSError, pa.ArrowException):  # which would hide the error under way
+            self._writer.close()
 
     def add(self, row: dict[str, Any]) -> None:
         """Add a row; a column that it does not name is null."""

@@ -12,12 +12,14 @@ import pandas as pd
 import pytest
 
 from decoders import formats as f
+from gateway.exports.parquet import RADIALS, ROWS, Table
 from gateway.words import STEP_NS
 from simulators import arinc708, racklink
 from tests.decoders.bus import word429
 from tests.gateway.exports.recorded import Flown, To, record
 from tests.gateway.live import replayed
 from tests.gateway.made import GNSS, RACK, RADAR, Bridge, radial, raw
+from tests.gateway.recording.disks import fill, needs_mount, small_disk
 
 PAGE = Path(__file__).parents[3] / "docs" / "formats.md"
 TEXT = {"label": str, "adapter": str, "name": str, "units": str, "status": str}
@@ -66,6 +68,16 @@ def test_a_word_without_a_value_has_none_and_says_why(tmp_path: Path, to: To) ->
         ("110", "SPOILT", None, None),
         ("110", "NO_DEFINITIONS", None, None),
     ]
+
+
+@needs_mount
+def test_a_disk_that_fills_up_between_two_row_groups_is_what_is_told(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1)  # which nothing makes smaller
+    with small_disk(tmp_path / "disk", 1) as disk:
+        fill(disk, 4096)
+        with pytest.raises(OSError, match="No space left on device"), Table(disk / "radials.parquet", RADIALS) as table:
+            for _ in range(ROWS + 1):
+                table.add({"bins": noise.bytes(512)})
 
 
 def test_csv_read_by_pandas_equals_the_parquet_table(flown: Flown, to: To) -> None:
