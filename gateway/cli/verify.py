@@ -24,11 +24,11 @@ def verify(
     for path in recordings:
         try:
             recording = Recording(path)
-        except GatewayError as error:
+            found = look(recording, stop.until)
+        except (GatewayError, OSError) as error:  # the second while the index is looked at
             typer.echo(f"{path}: NOT sound: {error}")
             wrong += 1
             continue
-        found = look(recording, stop.until)
         for line in [*found.remarks, *found.problems]:
             typer.echo(f"  {line}")
         if found.count > len(found.problems):

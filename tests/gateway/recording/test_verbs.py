@@ -1,5 +1,6 @@
 """verify, recover, cut and merge: what they say, what they write, and that it replays."""
 
+import subprocess
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -20,8 +21,8 @@ from gateway.recording.verify import verify
 from gateway.records import Note, Raw, Record, Stamp, Status
 from tests.gateway.live import replayed
 from tests.gateway.made import UTC_NS, raw, stamp, status, tick
-from tests.gateway.recording.disks import fill, needs_mount, small_disk
-from tests.gateway.shell import shadebus
+from tests.gateway.recording.disks import break_down, breaking_disk, fill, needs_mount, small_disk
+from tests.gateway.shell import WIDE, shadebus
 from tests.gateway.vendor_files import rdr4b
 from tests.golden.make import HERE
 
@@ -238,6 +239,23 @@ def test_of_several_recordings_each_is_verified_whatever_the_others_are(tmp_path
     assert done.returncode == 1
     assert f"{tmp_path / 'none.mcap'}: NOT sound: cannot read" in done.stdout
     assert f"{good}: 1 records in 1 files: sound" in done.stdout
+
+
+@needs_mount
+def test_what_cannot_be_read_in_the_middle_does_not_keep_others_from_being_verified(tmp_path: Path) -> None:
+    one, other = (made(tmp_path / name, [tick(0, 0)]) for name in ("a.mcap", "c.mcap"))
+    (tmp_path / "a.0002.mcap").mkdir()
+    with breaking_disk(tmp_path / "disk") as disk:
+        broken = made(disk / "b.mcap", [raw(k, k, bytes(10_000)) for k in range(100)])
+        subprocess.run(["sync", "-f", disk], check=True)
+        Path("/proc/sys/vm/drop_caches").write_text("1")
+        break_down(disk)
+        done = shadebus("verify", one, broken, other)
+    assert (done.returncode, done.stderr) == (1, "")
+    first, second, third = done.stdout.splitlines()
+    assert first.startswith(f"{one}: NOT sound: cannot read recording {tmp_path / 'a.0002.mcap'}")
+    assert second.startswith(f"{broken}: NOT sound: cannot read recording {broken}") and "Input/output error" in second
+    assert third == f"{other}: 1 records in 1 files: sound"
 
 
 def test_a_session_whose_first_file_is_gone_is_read_from_the_next_on(tmp_path: Path) -> None:
