@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from gateway.config import RackConfig
 from gateway.doctor.clock import host_clock
 from gateway.errors import GatewayError
+from gateway.names import shown
 from monitor.calibration import Calibration, load_calibration
 from monitor.integrity import Monitor
 from monitor.terrain import open_terrain
@@ -30,15 +31,24 @@ def build_monitor(config: RackConfig, calibration: Calibration | None = None) ->
         large_km2 = config.monitor.minimum_water_km2
         water = open_water(config.water, terrain, large_km2) if config.water else None
         return Monitor(terrain, config.monitor, calibration, water)
+    except UnicodeEncodeError:
+        raise  # of a name, which the command line tells
     except (TerrainError, ValueError) as error:
         raise GatewayError(str(error)) from error
 
 
 def describe(config: RackConfig, monitor: Monitor | None) -> dict[str, str]:
-    """The metadata of a new recording."""
+    """The metadata of a new recording. Raises GatewayError naming a path that is not UTF-8, as JSON has to be."""
+    # not model_dump_json, which writes an infinite number as null and so could not read it back
+    configuration = json.dumps(config.model_dump(mode="json"), ensure_ascii=False)
+    try:
+        configuration.encode()
+    except UnicodeEncodeError as error:
+        begin, end = configuration.rfind('"', 0, error.start) + 1, configuration.find('"', error.start)
+        name = shown(configuration[begin:end])
+        raise GatewayError(f"{name}: the name is not UTF-8, so no recording can hold it: rename it") from error
     return {
-        # not model_dump_json, which writes an infinite number as null and so could not read it back
-        "configuration": json.dumps(config.model_dump(mode="json")),
+        "configuration": configuration,
         "calibration": monitor.calibration.model_dump_json() if monitor and monitor.calibration else "",
         "terrain_checksum": monitor.terrain.checksum if monitor else "",
         "water_checksum": monitor.water.checksum if monitor and monitor.water else "",

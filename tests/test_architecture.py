@@ -87,6 +87,7 @@ def test_the_command_line_imports_its_work_lazily() -> None:
     assert {module for module in eager if module.startswith("gateway")} <= {
         "gateway.errors",
         "gateway.kernel_cache",
+        "gateway.names",
         *(f"gateway.cli.{path.stem}" for path in (ROOT / "gateway" / "cli").glob("*.py")),
     }
     assert {module.partition(".")[0] for module in eager} <= {
@@ -94,6 +95,7 @@ def test_the_command_line_imports_its_work_lazily() -> None:
         "typer",
         "typing",
         "collections",
+        "io",
         "os",
         "pathlib",
         "sys",

@@ -17,6 +17,7 @@ from gateway.calibrate.page import Histogram
 from gateway.calibrate.recorded import CELLS, LARGEST_SIZES, SHARES_OF_RANGE, Compared, Read, Setting
 from gateway.console import utc
 from gateway.errors import GatewayError
+from gateway.names import shown
 from monitor.calibration import Calibration
 from monitor.fitting import fit
 from monitor.geodesy import NM_M
@@ -143,7 +144,7 @@ def _provenance(reads: Sequence[Read], found: Material, usable: int) -> str:
         f"{read.name} ({utc(read.begins_utc_ns or 0)}, SHA-256 {read.digest[:16]})" for read in reads if read.scans
     )
     settings = json.dumps(reads[0].settings.model_dump(mode="json", exclude_defaults=True))
-    return (
+    return shown(
         f"{fitted} scans fitted and {usable - fitted} checked, of {len(found.scans)} that were compared and "
         f"{found.left_out} of other radar settings; recordings {recordings}; reference terrain "
         f"{'; '.join(sorted({read.terrain for read in reads}))}; monitor settings "

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Callable
+from io import TextIOWrapper
 
 import typer
 
@@ -27,6 +28,7 @@ from gateway.cli.simulate import simulate
 from gateway.cli.thresholds import thresholds
 from gateway.cli.verify import verify
 from gateway.errors import GatewayError
+from gateway.names import shown
 
 app = typer.Typer(
     name="shadebus",
@@ -54,6 +56,8 @@ def main() -> None:
     """Run the command line; an error that its user can mend is one line on stderr and exit code 1."""
     if sys.stdout is None:  # and the next file to be opened would take its place
         sys.exit("shadebus: standard output is closed: send it to a file, a pipe or /dev/null")
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: for names of files that are not UTF-8
     kernel_cache.choose()
     code, complaint = _end_of(app)
     flushed, unflushed = _end_of(sys.stdout.flush)
@@ -76,8 +80,17 @@ def _end_of(work: Callable[[], object]) -> tuple[int | str | None, str]:
         return 1, ""
     except OSError as error:
         return 1, f"{error.filename or 'standard output'}: {error.strerror or error}; choose another place for it"
-    except RuntimeError as error:
-        if "no locator available" not in str(error):
+    except (RuntimeError, UnicodeEncodeError) as error:
+        if not (told := _told(error)):
             raise
-        return 1, f"no directory takes the compiled kernels: {kernel_cache.MEND}"
+        return 1, told
     return 0, ""
+
+
+def _told(error: RuntimeError | UnicodeEncodeError) -> str:
+    """What to say of an error from a library's depths, and nothing of a defect."""
+    if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
+        return f"{shown(error.object)}: the name is not UTF-8, which what has to open it cannot take: rename it"
+    if "no locator available" in str(error):
+        return f"no directory takes the compiled kernels: {kernel_cache.MEND}"
+    return ""

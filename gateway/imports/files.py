@@ -7,6 +7,7 @@ from pathlib import Path
 from decoders.vendor_records import RecordFramer
 from gateway.errors import GatewayError
 from gateway.imports import Piece
+from gateway.names import shown
 
 BLOCK_BYTES = 1 << 20
 
@@ -42,7 +43,7 @@ class Source:
     @property
     def told(self) -> str:
         """Name, size and checksum of what was read."""
-        return f"imported {self.path.name}: {self.size} bytes, SHA-256 {self._digest.hexdigest()}"
+        return f"imported {shown(self.path.name)}: {self.size} bytes, SHA-256 {self._digest.hexdigest()}"
 
 
 def cut(sources: Iterable[Source], adapter: str, framer: RecordFramer) -> Iterator[Piece]:

@@ -16,6 +16,7 @@ from gateway.imports.plan import Wish, rack_of
 from gateway.imports.records import CHUNK_NS, SHARED_NS, Records
 from gateway.link import FLAG_NAMES
 from gateway.metadata import build_monitor, describe
+from gateway.names import shown
 from gateway.recording.whole import write_whole
 from gateway.records import Raw, Record
 
@@ -101,13 +102,13 @@ def _names(wish: Wish, interfaces: Mapping[str, str]) -> dict[str, str]:
     if interfaces:
         return {name: interface for interface, name in interfaces.items()}
     if wish.layout != "mxf":
-        return {wish.layout: ",".join(path.name for path in wish.files)}
+        return {wish.layout: ",".join(shown(path.name) for path in wish.files)}
     if len(wish.channels) != len(wish.files):
         raise GatewayError(
             f"mxf records do not say their channel: give a --channel for each file, in the same order "
             f"({len(wish.files)} files, {len(wish.channels)} channels)"
         )
-    return {f"mxf{k}": path.name for k, path in enumerate(wish.files)}
+    return {f"mxf{k}": shown(path.name) for k, path in enumerate(wish.files)}
 
 
 def _pieces(config: RackConfig, sources: list[Source], interfaces: dict[str, str]) -> Iterator[Piece]:

@@ -1,26 +1,38 @@
 """A part of a recording as a recording of its own."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
 from gateway.errors import GatewayError
+from gateway.names import shown
 from gateway.recording.session import Recording
 from gateway.recording.whole import write_whole
 from gateway.records import Record
 
+LONGEST_S = 1e10  # three hundred years: no recording is as long, and in ns it is far from overflow
+
 
 def moment(text: str) -> float | datetime:
     """Seconds from the first record, or a UTC. Raises GatewayError for what is neither."""
-    try:
-        return float(text)
-    except ValueError:
-        pass
+    with suppress(ValueError):
+        seconds = float(text)
+        if abs(seconds) <= LONGEST_S:
+            return seconds
     try:
         when = datetime.fromisoformat(text)
-    except ValueError as error:
+        return when.astimezone(UTC) if when.tzinfo else when.replace(tzinfo=UTC)
+    except (ValueError, OverflowError) as error:
         raise GatewayError(f"{text!r} is no time: write seconds, or UTC as 2026-05-28T20:26:41.5") from error
-    return when.astimezone(UTC) if when.tzinfo else when.replace(tzinfo=UTC)
+
+
+def in_order(start: float | datetime | None, stop: float | datetime | None) -> None:
+    """Raise GatewayError for a stop that does not come after the start, where the two can be compared."""
+    if start is None or stop is None or isinstance(start, datetime) != isinstance(stop, datetime):
+        return
+    if stop <= start:  # type: ignore[operator] # both are of one kind
+        raise GatewayError(f"--stop {stop} does not come after --start {start}: give a later --stop")
 
 
 def cut(
@@ -32,10 +44,11 @@ def cut(
 ) -> int:
     """Write the records from `start` up to `stop` to a new file, with their own sequences; how many there are.
 
-    Raises GatewayError as `write_whole` does, and if none lies between.
+    Raises GatewayError as `write_whole` does, if `stop` does not come after `start`, and if none lies between.
     """
+    in_order(start, stop)
     about = f"from {'the beginning' if start is None else start} to {'the end' if stop is None else stop}"
-    metadata = {**recording.metadata, "cut": f"{about} of {recording.path.name}"}
+    metadata = {**recording.metadata, "cut": f"{about} of {shown(recording.path.name)}"}
 
     def some() -> Iterator[Record]:
         within = False

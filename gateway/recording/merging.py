@@ -13,6 +13,7 @@ from pathlib import Path
 from gateway.config import AdapterConfig, RackConfig
 from gateway.errors import GatewayError
 from gateway.metadata import recorded_config
+from gateway.names import shown
 from gateway.recording.session import Recording
 from gateway.recording.whole import write_whole
 from gateway.records import Raw, Record, Stamp, Status
@@ -32,7 +33,7 @@ class _Source:
 
     @property
     def name(self) -> str:
-        return self.recording.path.name
+        return shown(self.recording.path.name)
 
     def overlaps(self, other: "_Source") -> bool:
         return not (

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from gateway.names import shown
 from gateway.recording.session import Recording
 from gateway.recording.whole import write_whole
 from gateway.records import Note, Raw, Record
@@ -31,20 +32,23 @@ def recover(recording: Recording, records: Iterator[Record], out: Path) -> str:
         if last:
             yield Note(last.sequence + 1, last.stamp, said[0])
 
-    write_whole(out, {**recording.metadata, "recovered": f"from {recording.path.name}"}, with_note())
+    write_whole(out, {**recording.metadata, "recovered": f"from {shown(recording.path.name)}"}, with_note())
     return said[0]
 
 
 def _note(recording: Recording, missing: int, again: int) -> str:
-    lost = [f"{place.length} bytes at {place.offset} of {place.path.name}: {place.what}" for place in recording.damage]
+    lost = [
+        f"{place.length} bytes at {place.offset} of {shown(place.path.name)}: {place.what}"
+        for place in recording.damage
+    ]
     if recording.damaged > len(lost):
         lost.append(f"{recording.damaged - len(lost)} more damaged places")
     if recording.torn:
-        lost.append(recording.torn)
+        lost.append(shown(recording.torn))
     if missing:
         lost.append(f"{missing} records are missing before or between others")
     if again:
         lost.append(f"{again} records came again or too late and are left out")
-    return f"recovered {recording.records - again} records from {recording.path.name}; " + (
+    return f"recovered {recording.records - again} records from {shown(recording.path.name)}; " + (
         "; ".join(lost) or "nothing was lost"
     )

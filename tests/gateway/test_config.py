@@ -121,6 +121,15 @@ def test_a_configuration_survives_the_recording_that_holds_it() -> None:
     assert recorded_config(describe(config, None)) == config
 
 
+def test_a_path_that_no_recording_could_hold_is_refused_before_it_records() -> None:
+    adapters = [{"name": "a", "source": "serial:x"}]
+    for table in ({"terrain": ["/maps/z\udcff.hgt"]}, {"recording": {"directory": "/maps/z\udcff.hgt"}}):
+        with pytest.raises(GatewayError, match=r"^/maps/z\\xff\.hgt: the name is not UTF-8, .*: rename it"):
+            describe(check_config({"adapters": adapters, **table}, "test"), None)
+    named = check_config({"adapters": adapters, "terrain": ["/Gelände/é.hgt"]}, "test")
+    assert recorded_config(describe(named, None)) == named
+
+
 OWN_PROFILE = '[my_radar]\nextends = "arinc708"\nscan_angle_zero = "tail"\n'
 OWN_SET = """[my_box]
 equipment_id = 0x0EE

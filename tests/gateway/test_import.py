@@ -21,7 +21,7 @@ from gateway.metadata import recorded_config
 from gateway.recording import Recording
 from gateway.records import Raw, Record, Tick
 from tests.gateway.conftest import TERRAIN
-from tests.gateway.importing import events, imported, notes, pitch_word, summary
+from tests.gateway.importing import events, imported, notes, passing, pitch_word, summary
 from tests.gateway.live import raw_records, recorded_bytes, records
 from tests.gateway.made import only
 from tests.gateway.shell import shadebus
@@ -313,6 +313,14 @@ def test_a_disk_that_is_full_is_named_and_nothing_half_is_left(tmp_path: Path, m
     with pytest.raises(GatewayError, match=r"cannot write .*out\.mcap: No space left on device; make room"):
         imported(tmp_path, "rdr4b", bytes(218))
     assert not (tmp_path / "out.mcap").exists()
+
+
+def test_a_file_whose_name_is_not_utf_8_is_imported_under_one_that_is(tmp_path: Path) -> None:
+    (tmp_path / "z\udcff.bin").write_bytes(rdr4b((0, 0, bytes(200))))
+    import_files(Wish([tmp_path / "z\udcff.bin"], "rdr4b"), tmp_path / "out.mcap", passing)
+    (adapter,) = recorded_config(Recording(tmp_path / "out.mcap").metadata).adapters
+    assert adapter.source == "file:z\\xff.bin"
+    assert notes(tmp_path / "out.mcap")[-1].startswith("imported z\\xff.bin: 218 bytes")
 
 
 def test_an_import_that_is_stopped_leaves_nothing(tmp_path: Path) -> None:

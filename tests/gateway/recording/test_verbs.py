@@ -354,6 +354,53 @@ def test_cuts_that_are_wrong_name_the_mend_and_leave_no_file(tmp_path: Path) -> 
     assert [*tmp_path.iterdir()] == []
 
 
+@pytest.mark.parametrize(
+    "text", ["nan", "inf", "-inf", "1e300", "9999-12-31T23:59:59-12:00", "0001-01-01T00:00:00+12:00"]
+)
+def test_what_no_clock_can_show_is_no_time(text: str) -> None:
+    with pytest.raises(GatewayError, match="is no time: write seconds, or UTC as"):
+        moment(text)
+
+
+@pytest.mark.parametrize(
+    ("start", "stop"), [("20", "10"), ("10", "10"), ("2026-05-28T20:26:45", "2026-05-28T20:26:44"), ("0", "-1")]
+)
+def test_a_stop_that_does_not_come_after_the_start_is_refused_by_name(tmp_path: Path, start: str, stop: str) -> None:
+    with pytest.raises(GatewayError, match=r"--stop .* does not come after --start .*: give a later --stop"):
+        cut(Recording(GOLDEN), Recording(GOLDEN), moment(start), moment(stop), tmp_path / "b.mcap")
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_names_that_are_not_utf_8_are_written_so_that_all_can_read_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(WIDE, "PYTHONIOENCODING", "utf-8")  # as in most locales: standard output is strict
+    path = tmp_path / "z\udcff.mcap"
+    path.write_bytes(GOLDEN.read_bytes()[:60_000])
+    for command, key in ((("recover",), "recovered"), (("cut", "--stop", "2"), "cut"), (("merge",), "merged")):
+        verb, *more = command
+        done = shadebus(verb, path, *more, "-o", tmp_path / f"{verb}\udcff.mcap")
+        assert (done.returncode, f"{verb}\\udcff.mcap" in done.stdout) == (0, True), done.stderr
+        made_of = Recording(tmp_path / f"{verb}\udcff.mcap")
+        assert "z\\xff.mcap" in made_of.metadata[key]
+        assert recorded_config(made_of.metadata).adapters
+    assert [r.text for r in Recording(tmp_path / "recover\udcff.mcap") if isinstance(r, Note)][-1].isprintable()
+    for verb in ("verify", "info"):
+        done = shadebus(verb, path)
+        assert "z\\udcff.mcap" in done.stdout and "Traceback" not in done.stderr
+
+
+def test_a_name_that_a_library_cannot_take_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "z\udcff.tif").touch()
+    for arguments in (
+        ("replay", GOLDEN, "--dem", tmp_path / "z\udcff.tif"),
+        ("export", GOLDEN, "--to", "csv", "-o", tmp_path / "z\udcff.csv"),
+    ):
+        done = shadebus(*arguments)
+        assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+        assert "z\\xff." in done.stderr and done.stderr.endswith("take: rename it\n")
+
+
 def test_a_cut_from_the_beginning_replays_to_the_first_events(tmp_path: Path) -> None:
     assert shadebus("cut", GOLDEN, "--stop", "5", "-o", tmp_path / "b.mcap").returncode == 0
     done = shadebus("replay", tmp_path / "b.mcap", "--json", cwd=HERE.parent.parent)
