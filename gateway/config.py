@@ -127,7 +127,7 @@ class VendorConfig(_Section):
     flags_429: dict[FlagName, Mask] | None = Field(None, description="the card's bits that mean it, by our flag")
     flags_708: dict[FlagName, Mask] | None = Field(None, description="the same of radar words")
     size_bits: Literal[1, 8, 16] | None = Field(None, description="what MXF's dataSize counts: bits, bytes or words")
-    words_per_s: float | None = Field(None, gt=0, le=1e6, description="of an RDR-4B's file, which has no times")
+    words_per_s: float | None = Field(None, ge=1, le=1e6, description="of an RDR-4B's file, which has no times")
 
 
 class AdapterConfig(_Section):

@@ -12,6 +12,7 @@ from gateway.errors import GatewayError
 from gateway.events import Event, IntegrityEvent, ScanEvent
 from gateway.pipeline import Pipeline, Watcher
 from gateway.recording import Recording
+from gateway.recording.cutting import in_order
 from gateway.records import Raw, Record, Status
 from monitor.integrity import Monitor
 
@@ -41,8 +42,9 @@ def replay(
     later depends on it, but its events are not emitted. `stop` ends the replay between two records, without a summary.
     `names` gives adapters, which `config` must know by them, other names than the recording does. `step` is called
     before each scan is emitted, and before a verdict without one; time at `speed` stands still meanwhile.
-    Raises what `emit` raised, and GatewayError if `start_s` lies past the end.
+    Raises what `emit` raised, and GatewayError if there is nothing from `start_s` to `stop_s`.
     """
+    in_order(start_s, stop_s)
     halt = stop or threading.Event()
     pace = _Pace(speed, start_s, halt)
     gate = _Gate(emit, step, halt, pace)
@@ -65,8 +67,12 @@ def replay(
                 core.process_all(Block.of([records]))
             if core.unheard:
                 raise core.unheard
-    if recording.records and not gate.open and (stop_s is None or stop_s >= start_s):
-        raise GatewayError(f"{recording.path} is only {elapsed_s:.1f} s long: start before its end")
+    if recording.records and not gate.open:
+        raise GatewayError(
+            f"{recording.path} is only {elapsed_s:.1f} s long: start before its end"
+            if stop_s is None
+            else f"{recording.path} has nothing from {start_s} to {stop_s}: `shadebus info` tells its times"
+        )
     if halt.is_set():  # while a scan waited for its turn
         return core.failures
     core.finish()

@@ -16,7 +16,9 @@ def import_(
     config: Annotated[Path | None, typer.Option("-c", "--config", help="rack file: channels, terrain, monitor")] = None,
     start_utc: Annotated[str | None, typer.Option(help="UTC of the first record, such as 2026-05-28T12:00:00Z")] = None,
     tick_ns: Annotated[int | None, typer.Option(min=1, help="ns a tick of the card's clock")] = None,
-    words_per_s: Annotated[float | None, typer.Option(help="of rdr4b, which has no times; 190 if left")] = None,
+    words_per_s: Annotated[
+        float | None, typer.Option(help="of rdr4b, which has no times: 1 to 1e6; 190 if left")
+    ] = None,
     size_bits: Annotated[int | None, typer.Option(help="bits of a unit of mxf's dataSize: 1, 8 or 16")] = None,
     flag: Annotated[
         list[str] | None, typer.Option(help="429.NAME=MASK or 708.NAME=MASK: the card's bits of an error; repeatable")

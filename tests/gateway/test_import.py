@@ -250,6 +250,7 @@ MISTAKES: dict[str, tuple[Case, str]] = {
         lambda d: [file(d), "--from", "rdr4b", "--channel", "1=708", "--channel", "1=429"],
         "channel 1 is said twice",
     ),
+    "rate": (lambda d: [file(d), "--from", "rdr4b", "--words-per-s", "1e-300"], "words_per_s: Input should be greater"),
     "tick": (lambda d: [file(d), "--from", "rdr4b", "--tick-ns", "5"], "--tick-ns: rdr4b has no use for it"),
     "flag": (lambda d: [file(d), "--from", "seqrecord", "--flag", "sync"], "--flag sync: write 429.NAME=MASK"),
     "flag name": (lambda d: [file(d), "--from", "seqrecord", "--flag", "429.odd=1"], "flags_429"),

@@ -63,6 +63,17 @@ def test_a_step_comes_before_each_scan_and_changes_no_event(recording: Path) -> 
     assert len(steps) >= 3
 
 
+@pytest.mark.parametrize(("start_s", "stop_s"), [(1.5, 0.5), (1.0, 1.0)])
+def test_a_replay_cannot_stop_before_it_starts(recording: Path, start_s: float, stop_s: float) -> None:
+    with pytest.raises(GatewayError, match=rf"--stop {stop_s} does not come after --start {start_s}: give a later"):
+        played(recording, start_s=start_s, stop_s=stop_s)
+
+
+def test_a_replay_of_a_pause_is_told_and_says_nothing_of_the_recording_s_length(recording: Path) -> None:
+    with pytest.raises(GatewayError, match=r"a\.mcap has nothing from 0\.7 to 0\.9: `shadebus info` tells its times"):
+        played(recording, start_s=0.7, stop_s=0.9)
+
+
 def test_time_at_a_speed_stands_still_while_a_step_is_waited_for(
     recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
