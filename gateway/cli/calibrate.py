@@ -1,7 +1,6 @@
 """`shadebus calibrate radar | dem`: how much disparity is normal."""
 
 from pathlib import Path
-from textwrap import shorten
 from typing import Annotated
 
 import typer
@@ -28,6 +27,8 @@ def calibrate_radar(
     how often each P_FA would have alerted.
     """
     from rich.progress import track
+
+    from textwrap import shorten
 
     from gateway.calibrate.page import Results, write_page
     from gateway.calibrate.radar import EXPLANATION, HEADINGS, calibration, displacement, histograms, material, table
