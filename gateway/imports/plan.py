@@ -60,7 +60,10 @@ def flags_of(texts: Sequence[str]) -> dict[str, dict[str, int]]:
         found = FLAG.fullmatch(text)
         if not found:
             raise GatewayError(f"--flag {text}: write 429.NAME=MASK or 708.NAME=MASK, such as 708.coding=0x10")
-        flags.setdefault(f"flags_{found[1]}", {})[found[2]] = int(found[3], 0)
+        masks = flags.setdefault(f"flags_{found[1]}", {})
+        if found[2] in masks:
+            raise GatewayError(f"--flag {text}: {found[1]}.{found[2]} is said twice: leave one out")
+        masks[found[2]] = int(found[3], 0)
     return flags
 
 
