@@ -26,9 +26,9 @@ def calibrate_radar(
     Prints the residuals of shadow centres by size and range limit. Half of the scans are fitted, the other half checks
     how often each P_FA would have alerted.
     """
-    from rich.progress import track
-
     from textwrap import shorten
+
+    from rich.progress import track
 
     from gateway.calibrate.page import Results, write_page
     from gateway.calibrate.radar import EXPLANATION, HEADINGS, calibration, displacement, histograms, material, table

@@ -1,9 +1,10 @@
 """`shadebus import`: files to a recording, in one pass (two for candump, whose interfaces must be known first)."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from heapq import merge
 from pathlib import Path
+from typing import NoReturn
 
 from decoders import formats as f
 from decoders.framing import PacketFramer
@@ -17,6 +18,7 @@ from gateway.imports.records import CHUNK_NS, SHARED_NS, Records
 from gateway.link import FLAG_NAMES
 from gateway.metadata import build_monitor, describe
 from gateway.names import shown
+from gateway.recording.layout import MAGIC
 from gateway.recording.whole import write_whole
 from gateway.records import Raw, Record
 
@@ -27,6 +29,12 @@ ASSUMED = {
     "mxf708": "{tick_ns} ns a tick of the card's clock; dataSize in units of {size_bits} bits; "
     "masks of control {flags_708}",
     "rdr4b": "the file has no times: {words_per_s:g} words a second, as if none were missing",
+}
+
+LOOKS: dict[str, Callable[[bytes], object]] = {  # by what a file without a word is said to be
+    "is an MCAP file, as recordings are, which need no import": lambda head: head.startswith(MAGIC),
+    "is a log of candump": lambda head: candump.LINE.fullmatch(head.partition(b"\n")[0]),
+    "begins with zeros": lambda head: not any(head),
 }
 
 
@@ -58,6 +66,9 @@ def import_files(wish: Wish, out: Path, obey: Callable[[Iterable[Record]], Itera
             if isinstance(record, Raw):
                 books[record.adapter].take(record.data)
             yield record
+        for name, files in _files_of(wish, names).items():
+            if not interfaces and not books[name].words:  # a log without frames was refused already
+                _refuse(files, wish.layout)
         yield from [maker.note(source.told) for source in sources]
 
     write_whole(out, describe(config, build_monitor(config)), all_there_is())
@@ -81,6 +92,11 @@ class Books:
             elif packet.type == f.WORD_708:
                 self._words["words_708"] += 1
                 self._words["words_708_flagged"] += packet.flags > 0
+
+    @property
+    def words(self) -> int:
+        """Words of either kind."""
+        return self._words["words_429"] + self._words["words_708"]
 
     def counters(self) -> dict[str, int]:
         """Every counter by name."""
@@ -121,3 +137,17 @@ def _pieces(config: RackConfig, sources: list[Source], interfaces: dict[str, str
     pairs = zip(config.adapters, sources, strict=True)
     files = [cut([source], adapter.name, record_framer(adapter)) for adapter, source in pairs]
     return merge(*files, key=lambda piece: piece.time_ns or 0)
+
+
+def _files_of(wish: Wish, names: Mapping[str, str]) -> dict[str, Sequence[Path]]:
+    """The files of each adapter."""
+    return {name: wish.files if len(names) == 1 else wish.files[k : k + 1] for k, name in enumerate(names)}
+
+
+def _refuse(files: Sequence[Path], layout: str) -> NoReturn:
+    """Raise GatewayError for files without a word, with what the first looks like."""
+    with files[0].open("rb") as file:
+        head = file.read(candump.LONGEST_LINE)
+    seen = next((name for name, looks_so in LOOKS.items() if looks_so(head)), f"begins with {head[:8].hex(' ')}")
+    told = ", ".join(shown(str(path)) for path in files)
+    raise GatewayError(f"{told}: no word could be read as {layout}: the file {seen}; name its own layout with --from")

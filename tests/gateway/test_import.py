@@ -26,6 +26,7 @@ from tests.gateway.live import raw_records, recorded_bytes, records
 from tests.gateway.made import only
 from tests.gateway.shell import shadebus
 from tests.gateway.vendor_files import Word, mxf, rdr4b, seqrecord, words_of
+from tests.golden.make import HERE
 
 CHANNELS = ("0=arinc708", "1=arinc429:iru_704", "2=arinc429:gnss_743a", "3=arinc429:ra_707")
 START = "2026-05-28T12:00:00Z"
@@ -38,6 +39,9 @@ source = "serial:/dev/x"
 """
 PITCH_LSB = 180 / 2**14  # of label 324: 14 bits and sign, of +-180 degrees
 FRAME = b"(1780000000.000100) can0 1601008B#8B800C6060E31600\n"
+GOLDEN = HERE / "format2.mcap"
+RADIAL = (0, 0, bytes(200))
+GOOD = {"seqrecord": seqrecord(RADIAL) * 2, "mxf": mxf(RADIAL), "rdr4b": rdr4b(RADIAL), "candump": FRAME}
 
 
 @pytest.fixture(scope="session")
@@ -181,7 +185,8 @@ def test_errors_that_the_card_saw_are_counted_and_its_words_not_used(tmp_path: P
 def test_garbage_is_kept_counted_and_never_a_crash(
     layout: str, garbage: bytes, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    content = FRAME + garbage if layout == "candump" else garbage
+    """Behind a good record, as garbage alone is refused."""
+    content = GOOD[layout] + garbage
     channels = channels_of(["0=arinc708"])
     out = imported(tmp_path_factory.mktemp("garbage"), layout, content, channels=channels)
     assert only(SummaryEvent, events(out))
@@ -253,6 +258,25 @@ MISTAKES: dict[str, tuple[Case, str]] = {
     "rate": (lambda d: [file(d), "--from", "rdr4b", "--words-per-s", "1e-300"], "words_per_s: Input should be greater"),
     "tick": (lambda d: [file(d), "--from", "rdr4b", "--tick-ns", "5"], "--tick-ns: rdr4b has no use for it"),
     "flag": (lambda d: [file(d), "--from", "seqrecord", "--flag", "sync"], "--flag sync: write 429.NAME=MASK"),
+    "flag twice": (
+        lambda d: [file(d), "--from", "mxf", "--flag", "708.coding=1", "--flag", "708.coding=2"],
+        "--flag 708.coding=2: 708.coding is said twice: leave one out",
+    ),
+    "random bytes": (
+        lambda d: [file(d, b"\x9c" * 5000), "--from", "seqrecord"],
+        "in.bin: no word could be read as seqrecord: the file begins with 9c 9c 9c 9c 9c 9c 9c 9c; name its own layout",
+    ),
+    "zeros": (lambda d: [file(d, bytes(5000)), "--from", "seqrecord"], "the file begins with zeros; name its own"),
+    "three bytes": (lambda d: [file(d, b"\1\2\3"), "--from", "rdr4b"], "as rdr4b: the file begins with 01 02 03; name"),
+    "a recording": (
+        lambda d: [GOLDEN, "--from", "seqrecord"],
+        "is an MCAP file, as recordings are, which need no import",
+    ),
+    "a log": (lambda d: [file(d, FRAME * 9), "--from", "seqrecord"], "the file is a log of candump; name its own"),
+    "one of two": (
+        lambda d: [file(d), GOLDEN, "--from", "mxf", "--channel", "0=708", "--channel", "1=429"],
+        "in.bin: no word could be read as mxf: the file begins with 78; name its own layout with --from",
+    ),
     "flag name": (lambda d: [file(d), "--from", "seqrecord", "--flag", "429.odd=1"], "flags_429"),
     "utc": (lambda d: [file(d), "--from", "rdr4b", "--start-utc", "noon"], "--start-utc noon: write it as 2026"),
     "early": (lambda d: [file(d), "--from", "rdr4b", "--start-utc", "1960-01-01"], "name a time from 1970 to 2099"),
