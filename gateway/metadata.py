@@ -17,6 +17,8 @@ from monitor.terrain import open_terrain
 from monitor.terrain_files import TerrainError
 from monitor.water import open_water
 
+COPY = "look for another copy, or update shadebus if a later version wrote it"
+
 
 def build_monitor(config: RackConfig, calibration: Calibration | None = None) -> Monitor | None:
     """The monitor that a configuration asks for, or None without terrain. Raises GatewayError naming the file."""
@@ -69,12 +71,12 @@ def _boot() -> str:
         return ""
 
 
-def recorded_config(metadata: dict[str, str]) -> RackConfig:
-    """The configuration that a recording was made with."""
+def recorded_config(metadata: dict[str, str], path: Path | str = "the recording") -> RackConfig:
+    """The configuration that a recording was made with. Raises GatewayError naming `path` if it holds none of ours."""
     try:
         return RackConfig.model_validate_json(metadata["configuration"])
     except (KeyError, ValidationError) as error:
-        raise GatewayError("the recording's metadata holds no configuration that this version understands") from error
+        raise GatewayError(f"{path} holds no configuration that this version understands: {COPY}") from error
 
 
 def recorded_monitor(
@@ -87,7 +89,7 @@ def recorded_monitor(
     try:
         calibration = Calibration.model_validate_json(metadata["calibration"]) if metadata["calibration"] else None
     except (KeyError, ValidationError) as error:
-        raise GatewayError("the recording's metadata holds no calibration that this version understands") from error
+        raise GatewayError(f"the recording holds no calibration that this version understands: {COPY}") from error
     config = config.with_maps(terrain, water)
     monitor = build_monitor(config, calibration)
     if monitor and not terrain and monitor.terrain.checksum != metadata["terrain_checksum"]:

@@ -37,7 +37,7 @@ def replay(
 
     times = speed_of(speed)
     source = Recording(recording)
-    config = recorded_config(source.metadata)
+    config = recorded_config(source.metadata, recording)
     names = names_of(rename or [], config)
     config = renamed(config, names)
     steps = Steps().wait if step else None

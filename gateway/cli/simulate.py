@@ -77,7 +77,7 @@ def _transmit(path: Path, adapter: str | None, to: str, speed: float, stop: thre
     from gateway.retransmission import Sent, carrier_of, chosen
 
     source = Recording(path)
-    config = chosen(recorded_config(source.metadata), adapter)
+    config = chosen(recorded_config(source.metadata, path), adapter)
     sent, carried = Sent(source, config), carrier_of(config)
     outlet, carrier = _opened(to)
     if carried == carrier.name or (carried, carrier.name) == ("can", "slcan"):

@@ -78,7 +78,7 @@ def _opened(recording: Recording, until: Until) -> _Source:
         first, last = first or record.stamp, record.stamp
     if first is None or last is None:
         raise GatewayError(f"{recording.path} holds no records: leave it out")
-    return _Source(recording, recorded_config(recording.metadata), first, last)
+    return _Source(recording, recorded_config(recording.metadata, recording.path), first, last)
 
 
 def _shift_ns(source: _Source, reference: _Source) -> int:

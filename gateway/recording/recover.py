@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from gateway.errors import GatewayError
 from gateway.names import shown
 from gateway.recording.session import Recording
 from gateway.recording.whole import write_whole
@@ -12,7 +13,7 @@ from gateway.records import Note, Raw, Record
 def recover(recording: Recording, records: Iterator[Record], out: Path) -> str:
     """Write what is whole to a new file, and last a note of what was lost; give that note.
 
-    `records` are those of the recording. Raises GatewayError as `write_whole` does.
+    `records` are those of the recording. Raises GatewayError as `write_whole` does, and if none is whole.
     """
     said = [""]
 
@@ -28,9 +29,10 @@ def recover(recording: Recording, records: Iterator[Record], out: Path) -> str:
             last, due = record, record.sequence + 1
             surely = record.sequence if isinstance(record, Raw) else surely
             yield record
+        if last is None:
+            raise GatewayError(f"{recording.path} holds no whole record to recover: look for another copy")
         said[0] = _note(recording, missing, again)
-        if last:
-            yield Note(last.sequence + 1, last.stamp, said[0])
+        yield Note(last.sequence + 1, last.stamp, said[0])
 
     write_whole(out, {**recording.metadata, "recovered": f"from {shown(recording.path.name)}"}, with_note())
     return said[0]

@@ -104,8 +104,14 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
     "missing recording": (lambda d: ["replay", d / "no.mcap"], ("no.mcap", "No such file")),
     "no recording": (lambda d: ["replay", file(d, b"text" * 99)], ("file is not a shadebus recording",)),
     "foreign recording": (lambda d: ["info", foreign_mcap(d)], ("foreign.mcap is an MCAP file, but not a shadebus",)),
-    "odd metadata": (lambda d: ["dump", without_configuration(d)], ("metadata holds no configuration",)),
-    "odd calibration": (lambda d: ["replay", without_calibration(d)], ("metadata holds no calibration",)),
+    "odd metadata": (
+        lambda d: ["dump", without_configuration(d)],
+        ("the recording holds no configuration", "look for another copy, or update"),
+    ),
+    "odd calibration": (
+        lambda d: ["replay", without_calibration(d)],
+        ("the recording holds no calibration", "look for another copy, or update"),
+    ),
     "missing calibration": (
         lambda d: source("--dem", TERRAIN, "--calibration", d / "no.json"),
         ("calibration file", "no.json cannot be read: No such file"),

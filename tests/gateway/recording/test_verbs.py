@@ -274,6 +274,27 @@ def test_a_session_is_recovered_as_one_file(tmp_path: Path) -> None:
     assert [record.sequence for record in Recording(tmp_path / "b.mcap")] == [0, 1, 2]
 
 
+def test_a_file_without_a_configuration_is_named_with_the_mend_and_one_without_a_record_is_not_recovered(
+    tmp_path: Path,
+) -> None:
+    for name, records in (("empty.mcap", []), ("bare.mcap", [tick(0, 0)])):
+        recorder = Recorder(tmp_path / name, {})
+        recorder.append(records)
+        recorder.close()
+    bare = tmp_path / "bare.mcap"
+    for command in (("replay", bare), ("simulate", "--from", bare), ("merge", bare, "-o", tmp_path / "new.mcap")):
+        done = shadebus(*command)
+        assert done.returncode == 1
+        told = "holds no configuration that this version understands: look for another copy, or update shadebus if"
+        assert f"{bare} {told}" in done.stderr
+    recording = Recording(tmp_path / "empty.mcap")
+    with pytest.raises(GatewayError, match=r"empty\.mcap holds no whole record to recover: look for another copy"):
+        recover(recording, iter(recording), tmp_path / "new.mcap")
+    assert not (tmp_path / "new.mcap").exists()
+    recover(Recording(bare), iter(Recording(bare)), tmp_path / "new.mcap")
+    assert [record.sequence for record in Recording(tmp_path / "new.mcap")] == [0, 1]
+
+
 def test_half_a_recording_is_not_left_behind(tmp_path: Path) -> None:
     def stopped() -> Callable[[], None]:
         raise SystemExit(130)
