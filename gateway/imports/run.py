@@ -31,11 +31,12 @@ ASSUMED = {
     "rdr4b": "the file has no times: {words_per_s:g} words a second, as if none were missing",
 }
 
-LOOKS: dict[str, Callable[[bytes], object]] = {  # by what a file without a word is said to be
-    "is an MCAP file, as recordings are, which need no import": lambda head: head.startswith(MAGIC),
-    "is a log of candump": lambda head: candump.LINE.fullmatch(head.partition(b"\n")[0]),
-    "begins with zeros": lambda head: not any(head),
+LOOKS: dict[str, Callable[[bytes], object]] = {  # by what a file without a word is said to be, and the mend
+    "is an MCAP file, as recordings are: `shadebus replay` takes it as it is": lambda head: head.startswith(MAGIC),
+    "is a log of candump: import it --from candump": lambda head: candump.LINE.fullmatch(head.partition(b"\n")[0]),
+    "begins with zeros: look for another copy": lambda head: not any(head),
 }
+OTHER = "name its own layout with --from, or look for another copy"
 
 
 def import_files(wish: Wish, out: Path, obey: Callable[[Iterable[Record]], Iterator[Record]]) -> dict[str, int]:
@@ -148,6 +149,8 @@ def _refuse(files: Sequence[Path], layout: str) -> NoReturn:
     """Raise GatewayError for files without a word, with what the first looks like."""
     with files[0].open("rb") as file:
         head = file.read(candump.LONGEST_LINE)
-    seen = next((name for name, looks_so in LOOKS.items() if looks_so(head)), f"begins with {head[:8].hex(' ')}")
+    seen = next(
+        (name for name, looks_so in LOOKS.items() if looks_so(head)), f"begins with {head[:8].hex(' ')}: {OTHER}"
+    )
     told = ", ".join(shown(str(path)) for path in files)
-    raise GatewayError(f"{told}: no word could be read as {layout}: the file {seen}; name its own layout with --from")
+    raise GatewayError(f"{told}: no word could be read as {layout}: the file {seen}")

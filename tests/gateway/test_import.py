@@ -264,18 +264,24 @@ MISTAKES: dict[str, tuple[Case, str]] = {
     ),
     "random bytes": (
         lambda d: [file(d, b"\x9c" * 5000), "--from", "seqrecord"],
-        "in.bin: no word could be read as seqrecord: the file begins with 9c 9c 9c 9c 9c 9c 9c 9c; name its own layout",
+        "in.bin: no word could be read as seqrecord: the file begins with 9c 9c 9c 9c 9c 9c 9c 9c: name its own layout",
     ),
-    "zeros": (lambda d: [file(d, bytes(5000)), "--from", "seqrecord"], "the file begins with zeros; name its own"),
-    "three bytes": (lambda d: [file(d, b"\1\2\3"), "--from", "rdr4b"], "as rdr4b: the file begins with 01 02 03; name"),
+    "zeros": (
+        lambda d: [file(d, bytes(5000)), "--from", "seqrecord"],
+        "the file begins with zeros: look for another copy",
+    ),
+    "three bytes": (lambda d: [file(d, b"\1\2\3"), "--from", "rdr4b"], "as rdr4b: the file begins with 01 02 03: name"),
     "a recording": (
         lambda d: [GOLDEN, "--from", "seqrecord"],
-        "is an MCAP file, as recordings are, which need no import",
+        "is an MCAP file, as recordings are: `shadebus replay` takes it as it is",
     ),
-    "a log": (lambda d: [file(d, FRAME * 9), "--from", "seqrecord"], "the file is a log of candump; name its own"),
+    "a log": (
+        lambda d: [file(d, FRAME * 9), "--from", "seqrecord"],
+        "the file is a log of candump: import it --from candump",
+    ),
     "one of two": (
         lambda d: [file(d), GOLDEN, "--from", "mxf", "--channel", "0=708", "--channel", "1=429"],
-        "in.bin: no word could be read as mxf: the file begins with 78; name its own layout with --from",
+        "in.bin: no word could be read as mxf: the file begins with 78: name its own layout with --from",
     ),
     "flag name": (lambda d: [file(d), "--from", "seqrecord", "--flag", "429.odd=1"], "flags_429"),
     "utc": (lambda d: [file(d), "--from", "rdr4b", "--start-utc", "noon"], "--start-utc noon: write it as 2026"),
