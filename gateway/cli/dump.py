@@ -26,7 +26,7 @@ def dump(
     from gateway.text import Wanted, lines
 
     source = Recording(recording)
-    config = recorded_config(source.metadata)
+    config = recorded_config(source.metadata, recording)
     wanted = Wanted.of(config, adapter or (), channel or (), label or ())
     for line in lines(stop.until(source), config, wanted):
         typer.echo(line)

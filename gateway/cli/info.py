@@ -30,7 +30,7 @@ def info(recording: Annotated[Path, typer.Argument(help="recording (MCAP)")]) ->
     from gateway.tables import plain_console
 
     source = Recording(recording)
-    config = recorded_config(source.metadata)
+    config = recorded_config(source.metadata, recording)
     pipeline = Pipeline(config, None)
     first = last = None
     raw_bytes, sync = 0, "nothing told"

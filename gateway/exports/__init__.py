@@ -61,7 +61,7 @@ def export(
     if form not in FORMATS:
         raise GatewayError(f"no format {form!r}: name one of {', '.join(FORMATS)}")
     source = Recording(recording)
-    job = Job(source, recorded_config(source.metadata), stop, terrain, without_terrain)
+    job = Job(source, recorded_config(source.metadata, recording), stop, terrain, without_terrain)
     write = import_module(FORMATS[form]).export
     with fresh(path) as place:
         said = [f"{path}: {write(job, place)}"]

@@ -64,7 +64,7 @@ def merge(recordings: Sequence[Recording], out: Path, until: Until = iter) -> li
     for source in sources:
         source.shift_ns -= min(earliest_ns, 0)  # of a host that was started before the first one
     adapters, told = _adapters(sources)
-    told += [f"{source.name}: {text}" for source in sources for text in source.recording.complaints]
+    told += [f"{source.name}: {shown(text)}" for source in sources for text in source.recording.complaints]
     metadata = _metadata(sources, adapters, told)
     streams = [source.records(until) for source in sources]
     merged = heapq.merge(*streams, key=lambda record: record.stamp.monotonic_ns)

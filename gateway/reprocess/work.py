@@ -88,7 +88,7 @@ def work(job: Job) -> Outcome:
 
 def set_up(job: Job, recording: Recording) -> tuple[RackConfig, Monitor | None]:
     """How a recording is to be read and judged. Raises GatewayError naming what is wrong."""
-    recorded = recorded_config(recording.metadata)
+    recorded = recorded_config(recording.metadata, job.path)
     config = (RackConfig.model_validate_json(job.config) if job.config else recorded).with_maps(job.terrain, job.water)
     names, given = ({adapter.name for adapter in one.adapters} for one in (recorded, config))
     if not names & given:
