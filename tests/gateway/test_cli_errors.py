@@ -106,7 +106,7 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
     "foreign recording": (lambda d: ["info", foreign_mcap(d)], ("foreign.mcap is an MCAP file, but not a shadebus",)),
     "odd metadata": (
         lambda d: ["dump", without_configuration(d)],
-        ("the recording holds no configuration", "look for another copy, or update"),
+        ("odd.mcap holds no configuration", "look for another copy, or update"),
     ),
     "odd calibration": (
         lambda d: ["replay", without_calibration(d)],
