@@ -114,11 +114,14 @@ def _in_order(runs: Iterable[Run], found: Findings, due: int | None) -> Iterator
             sequence = run.columns[SEQUENCE, : run.given].astype(np.int64)
         else:
             sequence = np.array([record.sequence for record in run], np.uint64).astype(np.int64)
-        if len(sequence):
-            steps = np.diff(sequence, prepend=(sequence[0] if due is None else due) - 1)
+        if not len(sequence):
+            continue
+        due = int(sequence[0]) if due is None else due
+        if not np.array_equal(sequence, np.arange(due, due + len(sequence))):
+            steps = np.diff(sequence, prepend=due - 1)
             found.missing += int(np.maximum(steps - 1, 0).sum())
             found.back += int(np.count_nonzero(steps < 1))
-            due = int(sequence[-1]) + 1
+        due = int(sequence[-1]) + 1
 
 
 def metadata_of(path: Path) -> dict[str, str]:
