@@ -3,11 +3,19 @@
 import struct
 from collections.abc import Iterator
 
-from gateway.recording.layout import LARGEST_DESCRIPTION, DamagedRecord, Topic, parse_channel, parse_metadata
+from gateway.recording.layout import (
+    CHANNEL,
+    LARGEST_DESCRIPTION,
+    METADATA,
+    METADATA_INDEX,
+    RECORD_HEAD,
+    DamagedRecord,
+    Topic,
+    parse_channel,
+    parse_metadata,
+)
 from gateway.recording.window import Window
 
-CHANNEL, METADATA, METADATA_INDEX = 4, 12, 13
-_RECORD = struct.Struct("<BQ")  # opcode, length
 _PLACE = struct.Struct("<QQ")  # of metadata: offset and length of its record
 
 
@@ -40,9 +48,9 @@ def metadata(window: Window) -> dict[str, str]:
 def _records(data: bytes, wanted: int) -> Iterator[bytes]:
     """The contents of the MCAP records of one kind that follow each other in some bytes."""
     at = 0
-    while at + _RECORD.size <= len(data):
-        opcode, length = _RECORD.unpack_from(data, at)
-        at += _RECORD.size
+    while at + RECORD_HEAD.size <= len(data):
+        opcode, length = RECORD_HEAD.unpack_from(data, at)
+        at += RECORD_HEAD.size
         if opcode == wanted and at + length <= len(data):
             yield data[at : at + length]
         at += length

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 from gateway.records import Note, Raw, Record, Stamp, Status, Tick
 
+RECORD_HEAD = struct.Struct("<BQ")  # of every MCAP record: opcode, length of what follows
+HEADER, CHANNEL, METADATA, METADATA_INDEX, DATA_END = 1, 4, 12, 13, 15  # opcodes
 MAGIC = b"\x89MCAP0\r\n"
 PROFILE = "shadebus"
 FORMAT = "2"  # what is written today

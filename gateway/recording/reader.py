@@ -20,10 +20,15 @@ from gateway.chunks import COLUMNS, MONOTONIC_NS, NUMBER, UTC_NS, Chunks, Run
 from gateway.recording import index
 from gateway.recording.kernels import CHANNELS, KNOWN, MESSAGE, RAW_BYTES, raw_records
 from gateway.recording.layout import (
+    CHANNEL,
+    DATA_END,
+    HEADER,
     LARGEST_DESCRIPTION,
     LARGEST_RECORD,
     MAGIC,
+    METADATA,
     PROFILE,
+    RECORD_HEAD,
     DamagedRecord,
     Topic,
     parse_channel,
@@ -36,11 +41,9 @@ from gateway.records import Raw, Record, Stamp
 AT_ONCE = 4096  # raw records
 KEPT_PLACES = 100  # of the damaged places; the others are counted
 SPENT_PER_BYTE = 16  # bytes of CRC for each byte passed over
-HEADER, CHANNEL, METADATA, DATA_END = 1, 4, 12, 15
-_RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _NAME = struct.pack("<I", len(PROFILE)) + PROFILE.encode()
-OPENING = MAGIC + _RECORD.pack(HEADER, 2 * len(_NAME)) + 2 * _NAME
+OPENING = MAGIC + RECORD_HEAD.pack(HEADER, 2 * len(_NAME)) + 2 * _NAME
 _MESSAGES = rb"\x05.{3}\x00{5}.{6}(.{8})\1"  # a length of 24 bits, and two times that are the same
 _ANYTHING = re.compile(_MESSAGES + rb"|\x04..\x00{6}|\x0c.{3}\x00{5}" + re.escape(_NAME), re.DOTALL)
 _ONLY_MESSAGES = re.compile(_MESSAGES, re.DOTALL)
@@ -153,16 +156,16 @@ class FileReader:
         The window is never asked for less than from that offset on, which may have to be looked at again.
         """
         window = self._window
-        head = window.get(at, _RECORD.size)
-        if len(head) < _RECORD.size:
+        head = window.get(at, RECORD_HEAD.size)
+        if len(head) < RECORD_HEAD.size:
             raise Implausible("it is cut short")
-        opcode, length = _RECORD.unpack(head)
-        end = at + _RECORD.size + length
+        opcode, length = RECORD_HEAD.unpack(head)
+        end = at + RECORD_HEAD.size + length
         if length >= LARGEST_RECORD or end > window.end:
             raise Implausible("the length of a record is wrong")
         if opcode == MESSAGE:
             return end, self._message(at, length)
-        content = window.get(at, _RECORD.size + min(length, LARGEST_DESCRIPTION))[_RECORD.size :]
+        content = window.get(at, RECORD_HEAD.size + min(length, LARGEST_DESCRIPTION))[RECORD_HEAD.size :]
         if opcode == CHANNEL:
             self._know(*parse_channel(content))
         elif opcode == METADATA:
@@ -175,7 +178,7 @@ class FileReader:
 
     def _message(self, at: int, length: int) -> Record:
         head = self._window.get(at, _MESSAGE.size)
-        size = length + _RECORD.size - _MESSAGE.size
+        size = length + RECORD_HEAD.size - _MESSAGE.size
         if size < 0 or len(head) < _MESSAGE.size:
             raise Implausible("a message is too short")
         _, _, number, low, log_ns, published_ns = _MESSAGE.unpack(head)

@@ -9,17 +9,14 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import duckdb
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from gateway.config import check_config
 from gateway.errors import GatewayError
 from gateway.events import IntegrityEvent
 from gateway.metadata import recorded_config, recorded_monitor
@@ -30,8 +27,7 @@ from gateway.reprocess.dataset import DataSet
 from gateway.reprocess.job import Job, Outcome, jobs
 from gateway.reprocess.run import reprocess
 from gateway.reprocess.work import key, work
-from monitor.calibration import uncalibrated
-from simulators.scenario import BUILT_IN_TERRAIN
+from tests.gateway.changing import Changing
 from tests.gateway.flown import record_flight
 from tests.gateway.live import wait_until
 from tests.gateway.shell import GATEWAY, shadebus
@@ -233,39 +229,6 @@ def test_only_what_is_new_or_has_changed_is_done_again(
     data.put(listed[1].name, work(listed[1]))
     monkeypatch.undo()
     assert not data.has(listed[1].name, partial(key, listed[1]))
-
-
-@dataclass
-class Changing:
-    """A recording to work out in this process by a rack file whose terrain and calibration are written anew."""
-
-    path: Path
-    directory: Path
-
-    @property
-    def job(self) -> Job:
-        table: dict[str, object] = {
-            "adapters": [{"name": "bridge", "source": "serial:x"}],
-            "terrain": [self.directory / "N44W072.hgt"],
-            "calibration": self.directory / "radar.json",
-        }
-        return Job("flight", (self.path,), json.dumps(check_config(table, "test").model_dump(mode="json")))
-
-    def raise_terrain(self, metres: int) -> None:
-        heights = np.fromfile(BUILT_IN_TERRAIN["white_mountains"], ">i2") + metres
-        heights.astype(">i2").tofile(self.directory / "N44W072.hgt")
-
-    def calibrate(self, name: str) -> None:
-        made = uncalibrated(512).model_copy(update={"name": name})
-        (self.directory / "radar.json").write_text(made.model_dump_json())
-
-    def outcome(self) -> tuple[set[str], bool, str]:
-        """What the verdicts say: their calibrations, and whether any finds the aircraft below ground; and the key."""
-        outcome = work(self.job)
-        assert outcome.whole["key"] == key(self.job)
-        rows = outcome.verdicts
-        below = any("below the stored terrain" in reason for row in rows for reason in row["reasons"])
-        return {row["calibration"] for row in rows}, below, outcome.whole["key"]
 
 
 def test_a_worker_that_lives_on_takes_terrain_and_calibration_as_they_are_now(flights: Path, tmp_path: Path) -> None:
