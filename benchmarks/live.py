@@ -21,8 +21,7 @@ from gateway.metadata import recorded_config, recorded_monitor
 from gateway.pipeline import Pipeline
 from gateway.recording import Recording
 from gateway.records import Raw, Record
-from gateway.warmup import warm_up_words
-from monitor.warmup import warm_up
+from gateway.warmup import warm_up_gateway
 
 LIMIT_MS = 2.0
 PERCENTILES = (50, 99, 99.9, 100)
@@ -38,8 +37,7 @@ def main() -> None:
         monitor = recorded_monitor(recording.metadata, config, ())
         assert monitor is not None
         records = list(recording)
-    warm_up_words()
-    warm_up(monitor)
+    warm_up_gateway(monitor)
     judged: list[int] = []
 
     def take(event: Event) -> None:

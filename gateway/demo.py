@@ -41,13 +41,12 @@ from gateway.report import Flown, Picture, write_report
 from gateway.stopping import Stop
 from gateway.tables import plain_console
 from gateway.threads import GuardedThread
-from gateway.warmup import warm_up_words
+from gateway.warmup import warm_up_gateway
 from monitor.comparison import Comparison
 from monitor.integrity import Monitor
 from monitor.scans import Scan
 from monitor.terrain import open_terrain
 from monitor.verdict import ALERT, OK, UNAVAILABLE, Verdict
-from monitor.warmup import warm_up
 
 SHIFT_EAST_M = 500.0
 SWEEP_S = 361 / 80  # 361 radials at 80 a second
@@ -122,8 +121,7 @@ def fly(out: Path, seed: int, speed: float, stop: Stop) -> None:
     console.print(
         f"Three legs of {LEG_S:.0f} s over the White Mountains at {speed:g} times real bus rates, P_FA {P_FA:g}"
     )
-    warm_up_words()
-    warm_up(Monitor(open_terrain(true_terrain)))  # or the first gateway compiles before it hears anything
+    warm_up_gateway(Monitor(open_terrain(true_terrain)))  # or the first gateway compiles before it hears anything
     flown = []
     for leg in legs:
         _live(leg, out, seed, speed, console, stop)

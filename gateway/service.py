@@ -18,9 +18,8 @@ from gateway.recording.keeper import NAME, Keeper
 from gateway.records import Raw
 from gateway.supervision import Supervisor
 from gateway.threads import GuardedThread
-from gateway.warmup import warm_up_words
+from gateway.warmup import warm_up_gateway, warm_up_words
 from monitor.integrity import Monitor
-from monitor.warmup import warm_up
 
 FIRST_OPEN_S = 3.0
 POLL_S = 0.1
@@ -44,9 +43,10 @@ class Service:
         self._core = core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, self._core_failed)
 
         def core_work() -> None:
-            warm_up_words()  # the journal records meanwhile
-            if monitor:
-                warm_up(monitor)
+            if monitor:  # the journal records meanwhile
+                warm_up_gateway(monitor)
+            else:
+                warm_up_words()
             self._to_core.run(core)
 
         self._supervisors = [

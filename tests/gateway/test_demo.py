@@ -105,7 +105,7 @@ def test_the_kernels_are_compiled_before_the_first_gateway_listens(
         happened.append("live")
         raise GatewayError("enough")
 
-    monkeypatch.setattr(demo, "warm_up", lambda _: happened.append("warm"))
+    monkeypatch.setattr(demo, "warm_up_gateway", lambda _: happened.append("warm"))
     monkeypatch.setattr(demo, "_live", live)
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     with pytest.raises(GatewayError, match="enough"):
