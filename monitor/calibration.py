@@ -35,16 +35,38 @@ class UnmatchedModel(BaseModel):
     least_size: int = Field(3, ge=1)  # of the files that do not say
 
 
-class CommonErrors(BaseModel):
-    """Errors that the disparities of a scan have in common: of the position, and of the height.
+class EdgeModel(BaseModel):
+    """How far edges of the radar's shadows lie from the terrain's when nothing is wrong, range bins.
 
-    `place_bins` is the standard deviation of a shift, north and east each, in range bins; `stretch` that of how much a
-    disparity grows with each bin of the shadow's size, since shadows seen from higher up are shorter.
+    Their median, and the largest deviation from it that counts in full.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    median_bins: float = Field(ge=-MOST_BINS, le=MOST_BINS)
+    clip_bins: float = Field(gt=0, le=MOST_BINS)
+
+
+class ShiftModel(BaseModel):
+    """How disparities lie over the azimuths when nothing is wrong.
+
+    Both edges, the scatter `sigma_bins` of the disparities of clipped edges, and two errors that the pairs of a scan
+    have in common: of the position, and of the height. `place_bins` is the standard deviation of a shift, north and
+    east each, in range bins; `stretch` that of how much a disparity grows with each bin of the shadow's size, since
+    shadows seen from higher up are shorter.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    front: EdgeModel
+    back: EdgeModel
+    sigma_bins: float = Field(gt=0)
     place_bins: float = Field(ge=0, le=MOST_BINS)
     stretch: float = Field(ge=0, le=10)
+
+    @model_validator(mode="after")
+    def _some_pair_stands_out(self) -> Self:
+        if self.sigma_bins > (clip := (self.front.clip_bins + self.back.clip_bins) / 2):
+            raise ValueError(f"sigma_bins {self.sigma_bins:g} is above {clip:g}, where disparities are clipped")
+        return self
 
 
 class Limits(BaseModel):
@@ -84,7 +106,7 @@ class Calibration(BaseModel):
     sigma_bins: float = Field(gt=0)
     rms_bins: float = Field(gt=0)
     variance_factor: float = Field(ge=1, le=1000)
-    common: CommonErrors | None = None
+    shift: ShiftModel | None = None
     unmatched_radar: UnmatchedModel | None = None
     unmatched_dem: UnmatchedModel | None = None
     level: Limits | None = None

@@ -24,19 +24,17 @@ PAIRINGS: Final[dict[str, Callable[[Any, Any], NDArray[np.void]]]] = {"overlap":
 class Comparison:
     """Both threads of one scan on the radials in use (n,), and their pairs of shadows (N,): for pictures and exports.
 
-    Centres of shadows are in range bins; `pair_radial` is the index of a pair's radial among those in use,
-    `pair_azimuth_rad` that radial's true azimuth, and `pair_size` how many bins the pair's terrain shadow has.
+    `seen` and `predicted` are the two shadows of each pair, as `monitor.shade.shadows` gives them, their radials as
+    indices among those in use; `pair_azimuth_rad` are these radials' true azimuths.
     `height_over_ground_m` is the antenna's on all radials of the pointing, NaN where the ground below is not known.
     """
 
     scan_angle_deg: NDArray[np.float64]
     radar_states: NDArray[np.int8]
     dem_states: NDArray[np.int8]
-    pair_radial: NDArray[np.int64]
+    seen: NDArray[np.void]
+    predicted: NDArray[np.void]
     pair_azimuth_rad: NDArray[np.float64]
-    pair_size: NDArray[np.float64]
-    radar_centre: NDArray[np.float64]
-    dem_centre: NDArray[np.float64]
     unmatched_radar: Unmatched
     unmatched_dem: Unmatched
     height_over_ground_m: NDArray[np.float64]
@@ -50,12 +48,14 @@ class Comparison:
     @property
     def disparities(self) -> NDArray[np.float64]:
         """D of eq. (6), range bins."""
-        return self.radar_centre - self.dem_centre
+        return np.asarray(self.seen["centre"] - self.predicted["centre"])
 
     def sample(self, scan: Scan) -> ScanSample:
         """What the tests look at, of the scan that was compared."""
-        pairs = self.disparities, self.pair_azimuth_rad, self.pair_size
-        return ScanSample(*pairs, self.unmatched_radar, self.unmatched_dem, signal_level(scan.bins), self.height_m)
+        front, back = (np.subtract(self.seen[edge], self.predicted[edge], dtype=float) for edge in ("front", "back"))
+        size = self.predicted["size"].astype(float)
+        shares = self.unmatched_radar, self.unmatched_dem
+        return ScanSample(front, back, self.pair_azimuth_rad, size, *shares, signal_level(scan.bins), self.height_m)
 
 
 def compare(
@@ -91,11 +91,9 @@ def compare(
         angles,
         radar,
         dem,
-        pairs["radial"],
+        whole[pairs["radar"]],
+        foreseen[pairs["dem"]],
         scene.pointing.azimuth_rad[pairs["radial"]],
-        foreseen["size"][pairs["dem"]].astype(np.float64),
-        whole["centre"][pairs["radar"]],
-        foreseen["centre"][pairs["dem"]],
         Unmatched(*unmatched_share(counted[counted["size"] >= s.unmatched_size], every_predicted, dem)),
         Unmatched(*unmatched_share(expected[expected["size"] >= s.unmatched_size], every_seen, radar)),
         pointing.height_m - terrain.elevation(pointing.latitude_deg, pointing.longitude_deg),

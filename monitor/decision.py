@@ -19,10 +19,9 @@ from monitor.calibration import Calibration, UnmatchedModel
 from monitor.disparity import minimum_detectable_bias, normalised, robust_statistic, robust_threshold, threshold
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
-from monitor.shift import score, shift_statistic, shift_threshold
+from monitor.shift import largest_statistic, score, shift_statistic, shift_threshold
 
 LEAST_RHO = 1e-6  # which is a binomial
-DIRECTIONS = 8  # of a half circle, in which a shift is tried
 MOST_PAIRS = 1000  # beyond, no further ones would make Q see
 RADAR_SHARE, DEM_SHARE = "the unmatched share of radar shadows", "the unmatched share of terrain shadows"
 
@@ -90,7 +89,7 @@ def examine(
     if settings.method == "robust":
         test = Test("Q", q, robust_threshold(len(d), p_fa.statistic, c.variance_factor))
         most = _most(len(d), c)
-        if most <= test.limit and not (shift and _sees_shifts(sample, c, shift.limit)):
+        if most <= test.limit and not (shift and c.shift and largest_statistic(sample, c.shift) > shift.limit):
             blind = f"Q reaches {most:.1f} at most, its threshold is {test.limit:.1f}"
             blind += ", and no shift would be found" if shift else ""
             return Findings(None, f"{len(d)} pairs cannot alert at P_FA {settings.p_fa:g}: {blind}", None, radar, dem)
@@ -132,7 +131,7 @@ def _shares(settings: MonitorSettings, calibration: Calibration) -> _Shares:
     s, c = settings, calibration
     if s.method == "paper":
         return _Shares(s.p_fa, 0.0, 0.0, 0.0)
-    shift = 0.0 if c.common is None else s.shift_budget
+    shift = 0.0 if c.shift is None else s.shift_budget
     radar, dem = (
         budget if _holds(model, s) else 0.0
         for model, budget in ((c.unmatched_radar, s.unmatched_radar_budget), (c.unmatched_dem, s.unmatched_dem_budget))
@@ -152,8 +151,8 @@ def untested(settings: MonitorSettings, calibration: Calibration) -> list[str]:
         found.append(f"calibration {name} does not say for which {', '.join(unsaid)} it holds: it is taken for any")
     if settings.method == "paper":
         return found
-    if calibration.common is None and settings.shift_budget:
-        found.append(f"shifts are not tested: calibration {name} has no errors in common, make it anew")
+    if calibration.shift is None and settings.shift_budget:
+        found.append(f"shifts are not tested: calibration {name} does not say how shadows lie, make it anew")
     model = calibration.unmatched_dem
     if settings.unmatched_dem_budget and not _holds(model, settings):
         has = f"those of {model.least_size} bins and more" if model else "none"
@@ -182,22 +181,10 @@ def unmatched_threshold(eligible: int, model: UnmatchedModel, p_fa: float) -> fl
 
 def shift_test(sample: ScanSample, c: Calibration, p_fa: float) -> Test | None:
     """Whether the disparities of a scan follow a shift; None without a share, or what a calibration needs for it."""
-    if c.common is None or not p_fa:
+    if c.shift is None or not p_fa:
         return None
-    found = shift_statistic(score(sample, c.median_bins, c.clip_bins), c.sigma_bins, c.common)
+    found = shift_statistic(score(sample, c.shift.front, c.shift.back), c.shift)
     return Test("the shift statistic", found, shift_threshold(p_fa))
-
-
-def _sees_shifts(sample: ScanSample, c: Calibration, limit: float) -> bool:
-    """Whether the shift statistic exceeds its limit for any shift, however large: its disparities are clipped."""
-    if c.common is None:
-        return False
-    for toward in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:
-        d = c.median_bins + c.clip_bins * np.sign(np.cos(sample.azimuth_rad - toward))
-        found = score(sample._replace(disparities=d), c.median_bins, c.clip_bins)
-        if shift_statistic(found, c.sigma_bins, c.common) > limit:
-            return True
-    return False
 
 
 def unmatched_test(name: str, found: Unmatched, model: UnmatchedModel | None, p_fa: float) -> Test | None:

@@ -10,14 +10,15 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from monitor.calibration import CLIP_FACTOR, Calibration, CheckedRate, Limits, UnmatchedModel
+from monitor.calibration import CLIP_FACTOR, Calibration, CheckedRate, EdgeModel, Limits, ShiftModel, UnmatchedModel
 from monitor.decision import examine
 from monitor.disparity import clipped, robust_statistic
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
-from monitor.shift import common_errors, score
+from monitor.shift import clipped_centres, score, with_common_errors
 
 QUARTILE = float(ndtri(0.75))  # of a normal distribution: half of it lies nearer to its median
 LEFT_OUT = 0.5  # percent of the scans at either end of the limits
@@ -46,12 +47,11 @@ def fit(
             f"only {len(usable)} scans have {minimum_pairs} pairs: fly longer, lower or over rougher terrain"
         )
     pooled = np.concatenate([scan.disparities for scan in usable])
-    median = float(np.median(pooled))
-    spread = float(np.median(np.abs(pooled - median)) / QUARTILE)
+    median, spread = _robust(pooled)
     if not spread:
         raise ValueError("half of the disparities are equal, so they have no spread: fit to a radar with its noise")
     clip = CLIP_FACTOR * spread
-    sigma = float(np.sqrt(np.mean(clipped(pooled, median, clip) ** 2)))
+    sigma = _rms(clipped(pooled, median, clip))
     q = np.array([robust_statistic(scan.disparities, median, clip, sigma) for scan in usable])
     n = np.array([len(scan.disparities) for scan in usable])
     made = Calibration(
@@ -63,9 +63,9 @@ def fit(
         median_bins=median,
         spread_bins=spread,
         sigma_bins=sigma,
-        rms_bins=float(np.sqrt(np.mean(pooled**2))),
+        rms_bins=_rms(pooled),
         variance_factor=max(1.0, float(np.mean((q - n) ** 2) / np.mean(2 * n))),
-        common=common_errors([score(scan, median, clip) for scan in usable], sigma),
+        shift=_shift(usable),
         unmatched_radar=_shares([scan.unmatched_radar for scan in usable], settings),
         unmatched_dem=_shares([scan.unmatched_dem for scan in usable], settings),
         level=_limits([scan.level for scan in usable]),
@@ -74,6 +74,29 @@ def fit(
     )
     held_out = [scan for scan in check if len(scan.disparities) >= minimum_pairs]
     return made.model_copy(update={"checked": tuple(_checked(held_out, made, settings, p_fa) for p_fa in p_fas)})
+
+
+def _robust(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Their median, and the normalised median absolute deviation from it."""
+    median = float(np.median(values))
+    return median, float(np.median(np.abs(values - median)) / QUARTILE)
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _shift(scans: Sequence[ScanSample]) -> ShiftModel:
+    front, back = _edge([scan.front for scan in scans]), _edge([scan.back for scan in scans])
+    sigma = _rms(np.concatenate([clipped_centres(scan, front, back) for scan in scans]))
+    bare = ShiftModel(front=front, back=back, sigma_bins=sigma, place_bins=0, stretch=0)
+    return with_common_errors(bare, [score(scan, front, back) for scan in scans])
+
+
+def _edge(residuals: Sequence[NDArray[np.float64]]) -> EdgeModel:
+    """Of coarse bins more than half of the edges may be exact; no edge is known to less than a bin."""
+    median, spread = _robust(np.concatenate(residuals))
+    return EdgeModel(median_bins=median, clip_bins=max(CLIP_FACTOR * spread, 1.0))
 
 
 def _checked(scans: Sequence[ScanSample], made: Calibration, settings: MonitorSettings, p_fa: float) -> CheckedRate:

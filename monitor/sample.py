@@ -20,12 +20,13 @@ class Unmatched(NamedTuple):
 
 
 class ScanSample(NamedTuple):
-    """Disparities (N,) of eq. (6) in range bins, the true azimuths (N,) of their radials and the sizes (N,) of their
-    terrain shadows in range bins; the unmatched shadows of either thread, the signal level, and the mean height of the
-    antenna above the ground below it, metres.
+    """How far the front and back edges (N,) of the radar's shadows lie from those of their partners, range bins; the
+    true azimuths (N,) of their radials and the sizes (N,) of their terrain shadows in range bins; the unmatched shadows
+    of either thread, the signal level, and the mean height of the antenna above the ground below it, metres.
     """
 
-    disparities: NDArray[np.float64]
+    front: NDArray[np.float64]
+    back: NDArray[np.float64]
     azimuth_rad: NDArray[np.float64]
     size: NDArray[np.float64]
     unmatched_radar: Unmatched
@@ -33,8 +34,14 @@ class ScanSample(NamedTuple):
     level: float  # of `signal_level`, NaN where nothing is lit
     height_m: float = math.nan
 
+    @property
+    def disparities(self) -> NDArray[np.float64]:
+        """D of eq. (6), of the centres, range bins (N,)."""
+        return (self.front + self.back) / 2
 
-NOTHING = ScanSample(np.empty(0), np.empty(0), np.empty(0), Unmatched(0, 0), Unmatched(0, 0), float("nan"))
+
+NONE = np.empty(0)
+NOTHING = ScanSample(NONE, NONE, NONE, NONE, Unmatched(0, 0), Unmatched(0, 0), math.nan)
 
 
 def signal_level(bins: NDArray[np.uint8]) -> float:

@@ -4,8 +4,9 @@ Terrain that is stored a vector b off its place is seen nearer or farther by the
 disparities follow the cosine of the azimuth. Two components of all pairs together stand out of their scatter where
 their squares, each by itself, do not: this sees shifts that Q does not see yet.
 
-Of the disparities z, clipped as for Q, g = sum(z a) is the score of b, where a is the unit vector of a radial, north
-and east. When nothing is wrong its covariance is
+Often one edge of a shadow only is where it should be, as where two shadows have become one; the centre is then far off.
+So the edges are clipped, each by itself: z is the mean of both, about their medians. g = sum(z a) is the score of b,
+where a is the unit vector of a radial, north and east. When nothing is wrong its covariance is
 
     V = sigma^2 M + s^2 M^2 + t^2 u u'    with    M = sum(a a'),  u = sum(w a):
 
@@ -21,12 +22,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from monitor.calibration import CommonErrors
+from monitor.calibration import EdgeModel, ShiftModel
 from monitor.disparity import clipped
 from monitor.sample import ScanSample
 
 LARGEST_BINS = 64.0  # a common error beyond it is none that any receiver has
 HALVINGS = 40
+DIRECTIONS = 8  # of a half circle, in which a shift is tried
 LEAST_INFORMATION = 1e-9  # of a direction, beside the other: radials all at one azimuth say nothing across it
 
 
@@ -48,20 +50,46 @@ class MeanShift(NamedTuple):
     statistic: float
 
 
-def score(sample: ScanSample, median: float, clip: float) -> Score:
-    """Sums over the pairs of a sample, about a median and clipped, in range bins."""
-    z = clipped(sample.disparities, median, clip)
-    a = np.stack([np.cos(sample.azimuth_rad), np.sin(sample.azimuth_rad)])
-    w = sample.size
+def score(sample: ScanSample, front: EdgeModel, back: EdgeModel) -> Score:
+    """Sums over the pairs of a sample, in range bins."""
+    z = clipped_centres(sample, front, back)
+    a, w = _towards(sample), sample.size
     return Score(a @ z, a @ a.T, a @ w, float(w @ z), float(w @ w))
 
 
-def shift_statistic(found: Score, sigma: float, common: CommonErrors) -> float:
-    """S, dimensionless, of pairs that scatter by sigma range bins and have those errors in common."""
-    m = found.information
-    covariance = sigma**2 * m + common.place_bins**2 * m @ m
-    covariance += common.stretch**2 * np.outer(found.mixing, found.mixing)
-    return float(found.shift @ np.linalg.pinv(covariance, LEAST_INFORMATION, hermitian=True) @ found.shift)
+def clipped_centres(sample: ScanSample, front: EdgeModel, back: EdgeModel) -> NDArray[np.float64]:
+    """The disparities (N,) that the edges of shadows have about their medians, each edge clipped; range bins."""
+    fronts = clipped(sample.front, front.median_bins, front.clip_bins)
+    return (fronts + clipped(sample.back, back.median_bins, back.clip_bins)) / 2
+
+
+def _towards(sample: ScanSample) -> NDArray[np.float64]:
+    """North and east of each pair's radial (2, N)."""
+    return np.stack([np.cos(sample.azimuth_rad), np.sin(sample.azimuth_rad)])
+
+
+def shift_statistic(found: Score, model: ShiftModel) -> float:
+    """S, dimensionless, of pairs that scatter and err in common as the model says."""
+    return float(_statistics(found.shift, found.information, found.mixing, model))
+
+
+def _statistics(
+    g: NDArray[np.float64], m: NDArray[np.float64], u: NDArray[np.float64], model: ShiftModel
+) -> NDArray[np.float64]:
+    """S of each g (..., 2), M (..., 2, 2) and u (..., 2)."""
+    covariance = model.sigma_bins**2 * m + model.place_bins**2 * m @ m
+    covariance += model.stretch**2 * (u[..., :, None] * u[..., None, :])
+    inverse = np.linalg.pinv(covariance, LEAST_INFORMATION, hermitian=True)
+    return np.asarray(g[..., None, :] @ inverse @ g[..., :, None])[..., 0, 0]
+
+
+def largest_statistic(sample: ScanSample, model: ShiftModel) -> float:
+    """What S comes to, of several directions at the most, for a shift that clips every pair of a sample."""
+    clip = (model.front.clip_bins + model.back.clip_bins) / 2
+    a, found = _towards(sample), score(sample, model.front, model.back)
+    angles = np.arange(DIRECTIONS) * np.pi / DIRECTIONS
+    towards = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return float(_statistics(clip * np.sign(towards @ a) @ a.T, found.information, found.mixing, model).max())
 
 
 def shift_threshold(p_fa: float) -> float:
@@ -69,21 +97,28 @@ def shift_threshold(p_fa: float) -> float:
     return -2 * math.log(p_fa)
 
 
-def common_errors(scans: Sequence[Score], sigma: float) -> CommonErrors:
-    """The errors in common of fault-free scans whose pairs scatter by sigma range bins.
+def with_common_errors(bare: ShiftModel, scans: Sequence[Score]) -> ShiftModel:
+    """The model with the errors in common that fault-free scans have whose pairs scatter as it says.
 
     The stretch is what the scatter of the pairs does not explain of how disparities go with sizes, from scan to scan;
     the error of the position is the one with which the mean of S is 2, as of chi-square. Either is 0 where the scatter
     explains all.
     """
-    spare = [(s.stretch / s.stretch_information) ** 2 - sigma**2 / s.stretch_information for s in scans]
+    variance = bare.sigma_bins**2
+    spare = [(s.stretch / s.stretch_information) ** 2 - variance / s.stretch_information for s in scans]
     stretch = math.sqrt(max(0.0, float(np.mean(spare))))
+
+    g, m, u = (np.array(column) for column in zip(*((s.shift, s.information, s.mixing) for s in scans), strict=True))
+
+    def erring(place_bins: float) -> ShiftModel:
+        return bare.model_copy(update={"place_bins": place_bins, "stretch": stretch})
+
     low, high = 0.0, LARGEST_BINS
     for _ in range(HALVINGS):
-        middle = CommonErrors(place_bins=(low + high) / 2, stretch=stretch)
-        mean = np.mean([shift_statistic(scan, sigma, middle) for scan in scans])
-        low, high = (middle.place_bins, high) if mean > 2 else (low, middle.place_bins)
-    return CommonErrors(place_bins=high if low else 0.0, stretch=stretch)
+        middle = (low + high) / 2
+        mean = np.mean(_statistics(g, m, u, erring(middle)))
+        low, high = (middle, high) if mean > 2 else (low, middle)
+    return erring(high if low else 0.0)
 
 
 def mean_shift(scans: Sequence[Score]) -> MeanShift:

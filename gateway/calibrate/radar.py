@@ -9,7 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from importlib.metadata import version
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from gateway.calibrate.recorded import CELLS, LARGEST_SIZES, SHARES_OF_RANGE, Co
 from gateway.console import utc
 from gateway.errors import GatewayError
 from gateway.names import shown
-from monitor.calibration import Calibration
+from monitor.calibration import Calibration, ShiftModel
 from monitor.fitting import fit
 from monitor.geodesy import NM_M
 from monitor.residuals import NORMALITY_TEST, moments, normality
@@ -124,7 +124,8 @@ def calibration(name: str, reads: Sequence[Read], found: Material, least_scans: 
 
 def displacement(found: Material, made: Calibration) -> str:
     """Where the stored terrain lies from where the radar sees it, on average; and what to check if that is far off."""
-    shift = mean_shift([score(scan.sample, made.median_bins, made.clip_bins) for scan in found.scans])
+    model = cast(ShiftModel, made.shift)  # which no fit lacks
+    shift = mean_shift([score(scan.sample, model.front, model.back) for scan in found.scans])
     bin_m = found.setting.range_nm * NM_M / found.setting.bins
     # Terrain that lies farther north than where the radar sees it has its shadows farther off there than the radar's.
     north, east = -bin_m * shift.bins

@@ -146,9 +146,9 @@ def disparity_rows(item: Judged) -> list[dict[str, Any]]:
     if compared is None:
         return []
     columns = (
-        compared.scan_angle_deg[compared.pair_radial],
-        compared.radar_centre,
-        compared.dem_centre,
+        compared.scan_angle_deg[compared.seen["radial"]],
+        compared.seen["centre"],
+        compared.predicted["centre"],
         compared.disparities,
     )
     here = int(item.utc_ns.max()), item.scan.number

@@ -180,7 +180,7 @@ def made(name: str, begins_utc_ns: int, *scans: Compared, p_fa: float = 1e-4, re
 def scan(value: float, range_nm: float = 10.0) -> Compared:
     """Twenty disparities about a value, which tells one scan from another."""
     d = value + np.tile([-2.0, -1.0, 1.0, 2.0], 5)
-    sample = ScanSample(d, np.zeros(len(d)), np.ones(len(d)), Unmatched(2, 10), Unmatched(2, 10), 3.0)
+    sample = ScanSample(d, d, np.zeros(len(d)), np.ones(len(d)), Unmatched(2, 10), Unmatched(2, 10), 3.0)
     return Compared(Setting(512, range_nm, "arinc708"), sample, (d,) * len(CELLS))
 
 

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from scipy.stats import betabinom, binom, chi2
 
-from monitor.calibration import Calibration, CommonErrors, UnmatchedModel
+from monitor.calibration import Calibration, EdgeModel, ShiftModel, UnmatchedModel
 from monitor.decision import DEM_SHARE, RADAR_SHARE, examine, pairs_for_verdict, unmatched_threshold, untested
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
 
 MODEL = UnmatchedModel(mean=0.3, overdispersion=0.02, least_size=8)
+EDGE = EdgeModel(median_bins=0.0, clip_bins=4.0)
+SHIFT = ShiftModel(front=EDGE, back=EDGE, sigma_bins=2.0, place_bins=0.5, stretch=0.0)
 CALIBRATION = Calibration(
     name="made",
     provenance="made up",
@@ -21,16 +23,16 @@ CALIBRATION = Calibration(
     sigma_bins=2.0,
     rms_bins=4.0,
     variance_factor=1.0,
-    common=CommonErrors(place_bins=0.5, stretch=0.0),
+    shift=SHIFT,
     unmatched_radar=MODEL,
     unmatched_dem=MODEL,
 )
-BARE = CALIBRATION.model_copy(update={"common": None, "unmatched_radar": None, "unmatched_dem": None})
+BARE = CALIBRATION.model_copy(update={"shift": None, "unmatched_radar": None, "unmatched_dem": None})
 FEW, MANY = Unmatched(10, 50), Unmatched(45, 50)
 
 
 def sample(n: int = 40, d: float = 1.0, radar: Unmatched = FEW, dem: Unmatched = FEW) -> ScanSample:
-    return ScanSample(np.full(n, d), np.linspace(-np.pi, np.pi, n), np.full(n, 9.0), radar, dem, 2.0)
+    return ScanSample(np.full(n, d), np.full(n, d), np.linspace(-np.pi, np.pi, n), np.full(n, 9.0), radar, dem, 2.0)
 
 
 @pytest.mark.parametrize("eligible", [2, 3, 5, 8, 20, 60, 200])
@@ -107,7 +109,8 @@ def test_unmatched_shadows_alert_alone_where_there_are_too_few_pairs_for_the_sta
 
 
 def test_disparities_that_follow_the_cosine_of_the_azimuth_alert_where_their_squares_do_not() -> None:
-    shifted = sample()._replace(disparities=3 * np.cos(sample().azimuth_rad))
+    d = 3 * np.cos(sample().azimuth_rad)
+    shifted = sample()._replace(front=d, back=d)
     found = examine(shifted, MonitorSettings(p_fa=1e-3), CALIBRATION)
     assert [test.name for test in found.alerts] == ["the shift statistic"]
     assert not examine(shifted, MonitorSettings(p_fa=1e-3), BARE).alerts
@@ -115,15 +118,13 @@ def test_disparities_that_follow_the_cosine_of_the_azimuth_alert_where_their_squ
 
 def test_a_calibration_without_what_a_test_needs_leaves_its_share_to_q_and_says_so() -> None:
     settings = MonitorSettings(p_fa=1e-3)
-    old = CALIBRATION.model_copy(
-        update={"common": None, "unmatched_dem": UnmatchedModel(mean=0.3, overdispersion=0.02)}
-    )
+    old = CALIBRATION.model_copy(update={"shift": None, "unmatched_dem": UnmatchedModel(mean=0.3, overdispersion=0.02)})
     found = examine(sample(dem=MANY), settings, old)
     assert (found.shift, found.unmatched_dem) == (None, None)
     assert found.statistic is not None
     assert found.statistic.limit == pytest.approx(chi2.isf(1e-3, 40))
     shift, unmatched = untested(settings, old)
-    assert shift == "shifts are not tested: calibration made has no errors in common, make it anew"
+    assert shift == "shifts are not tested: calibration made does not say how shadows lie, make it anew"
     assert "of 8 bins and more are not tested: calibration made has those of 3 bins and more" in unmatched
     assert not untested(settings, CALIBRATION)
     assert not untested(settings.model_copy(update={"method": "paper"}), old)
@@ -137,7 +138,7 @@ def test_a_calibration_that_does_not_say_for_which_radar_it_holds_is_named() -> 
 def test_where_neither_q_nor_the_shift_statistic_could_alert_nothing_is_ok() -> None:
     """Common errors of the position as large as these hide any shift, and 20 clipped pairs Q at such a P_FA."""
     exact, wide = (
-        CALIBRATION.model_copy(update={"common": CommonErrors(place_bins=place_bins, stretch=0.0)})
+        CALIBRATION.model_copy(update={"shift": SHIFT.model_copy(update={"place_bins": place_bins})})
         for place_bins in (0.0, 60.0)
     )
     settings = MonitorSettings(p_fa=1e-9, unmatched_dem_budget=0.0)

@@ -28,7 +28,7 @@ def normal_scans(scans: int, n: int = 50, common: float = 0.0) -> Scans:
 def fitted(scans: Scans, check: Scans | None = None, p_fas: tuple[float, ...] = ()) -> Calibration:
     """To scans whose shadows all have partners."""
     fitting, checking = (
-        [ScanSample(d, np.zeros(len(d)), np.ones(len(d)), NONE, NONE, np.nan) for d in some]
+        [ScanSample(d, d, np.zeros(len(d)), np.ones(len(d)), NONE, NONE, np.nan) for d in some]
         for some in (scans, check or [])
     )
     return fit(fitting, checking, p_fas, SETTINGS, name="made", provenance="drawn", bins=512, range_nm=10.0)
@@ -118,7 +118,7 @@ def test_disparities_without_a_spread_are_refused() -> None:
 
 def fitted_to_shares(counts: Any, eligible: int, levels: NDArray[np.float64]) -> Calibration:
     scans = [
-        ScanSample(d, np.zeros(len(d)), np.ones(len(d)), Unmatched(int(count), eligible), NONE, level)
+        ScanSample(d, d, np.zeros(len(d)), np.ones(len(d)), Unmatched(int(count), eligible), NONE, level)
         for d, count, level in zip(normal_scans(len(counts)), counts, levels, strict=True)
     ]
     return fit(scans, [], (), SETTINGS, name="made", provenance="drawn")
