@@ -1,6 +1,7 @@
 """What a person at a terminal reads: one line an event."""
 
 import sys
+from collections.abc import Iterator
 from datetime import UTC, datetime
 
 from gateway.events import Event, IntegrityEvent, ScanEvent, StatusEvent, SummaryEvent
@@ -30,21 +31,24 @@ def describe(event: Event) -> str:
         gaps += f", {event.cut_off} cut off" if event.cut_off else ""
         return f"scan {event.scan}: {event.radials} radials{gaps}, {low:+.0f} to {high:+.0f} deg, {event.range_nm:g} NM"
     if isinstance(event, IntegrityEvent):
-        reasons = "; ".join(event.reasons)
-        if event.q is None or event.threshold is None or event.t_bins2 is None:
-            return f"scan {event.scan}: {event.verdict.upper()}  {reasons}"
-        robust = event.method == "robust"
-        decides = f"Q {event.q:.1f}" if robust else f"N T / sigma^2 {event.t_normalised:.1f}"
-        figures = f"N {event.n_pairs}  T {event.t_bins2:.1f} bins2  {decides} against {event.threshold:.1f}"
-        if event.shift is not None and event.shift_limit is not None:
-            figures += f"  S {event.shift:.1f} against {event.shift_limit:.1f}"
-        if event.offset_north_m is not None and event.offset_east_m is not None:
-            place = f"{event.offset_north_m:+.0f} m north, {event.offset_east_m:+.0f} m east"
-            figures += f"  off by {place} ({event.offset_confidence:.0%})"
-        return f"scan {event.scan}: {event.verdict.upper()}  {figures}  {reasons}"
+        return "  ".join((f"scan {event.scan}: {event.verdict.upper()}", *_figures(event), "; ".join(event.reasons)))
     if isinstance(event, SummaryEvent):
         return "summary: " + ", ".join(f"{name} {count}" for name, count in event.counters.items() if count)
     return ""
+
+
+def _figures(event: IntegrityEvent) -> Iterator[str]:
+    """Each test that there was, against what it may reach."""
+    if event.q is not None and event.threshold is not None and event.t_bins2 is not None:
+        decides = f"Q {event.q:.1f}" if event.method == "robust" else f"N T / sigma^2 {event.t_normalised:.1f}"
+        yield f"N {event.n_pairs}  T {event.t_bins2:.1f} bins2  {decides} against {event.threshold:.1f}"
+    if event.shift is not None and event.shift_limit is not None:
+        yield f"S {event.shift:.1f} against {event.shift_limit:.1f}"
+    if event.unmatched_dem is not None and event.unmatched_dem_limit is not None:
+        yield f"unmatched {event.unmatched_dem:.0%} against {event.unmatched_dem_limit:.0%}"
+    if event.offset_north_m is not None and event.offset_east_m is not None:
+        place = f"{event.offset_north_m:+.0f} m north, {event.offset_east_m:+.0f} m east"
+        yield f"off by {place} ({event.offset_confidence:.0%})"
 
 
 def clock(time_ns: int) -> str:
