@@ -27,7 +27,8 @@ BINARY = [
 def test_every_value_of_a_field_comes_back_exactly(name: str, row: Definition) -> None:
     width = row.bits[1] - row.bits[0] + 1
     integers = np.arange(-(2**width) if row.encoding == "bnr" else 0, 2**width)
-    sent = np.array([float(integer * row.lsb) for integer in integers.tolist()])
+    # Python's quotient of two integers is the exact one rounded once.
+    sent = np.array([integer * row.lsb.numerator / row.lsb.denominator for integer in integers.tolist()])
     words = encode_array(row.label, sent, definition=row, ssm=0 if row.ssm == "disc" else 3)
     values = decode(words, load_definitions(name))
     assert not values.status.any()
