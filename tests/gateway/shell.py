@@ -1,4 +1,4 @@
-"""The real command line as a process of its own."""
+"""The real command line, as a process of its own or within this one."""
 
 import json
 import os
@@ -6,11 +6,17 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from threading import Thread
 from types import TracebackType
 from typing import Self
+from unittest.mock import patch
 
+import pytest
+
+from gateway.cli import main
 from tests.gateway.live import wait_until
 
 START_S = 60.0
@@ -22,6 +28,23 @@ def shadebus(*arguments: str | Path, cwd: Path | None = None) -> "subprocess.Com
     """Run a verb to its end."""
     command = [*GATEWAY, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=START_S, env=WIDE, cwd=cwd, check=False)
+
+
+def within(*arguments: str | Path) -> "subprocess.CompletedProcess[str]":
+    """Run a verb to its end in this process, which saves its start; the signals stay those of the tests."""
+    command, output, errors = ["shadebus", *map(str, arguments)], StringIO(), StringIO()
+    with (
+        patch.object(sys, "argv", command),
+        patch.dict(os.environ, WIDE),
+        patch("gateway.stopping.signal.signal"),
+        redirect_stdout(output),
+        redirect_stderr(errors),
+        pytest.raises(SystemExit) as end,
+    ):
+        main()
+    code = end.value.code
+    assert isinstance(code, int)
+    return subprocess.CompletedProcess(command, code, output.getvalue(), errors.getvalue())
 
 
 def limited(largest_file: int | None) -> Sequence[str]:

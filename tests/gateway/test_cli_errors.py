@@ -18,7 +18,7 @@ from gateway.recording import Recorder
 from simulators.outlets import PtyOutlet
 from tests.gateway.conftest import TERRAIN
 from tests.gateway.made import tick
-from tests.gateway.shell import GATEWAY, shadebus
+from tests.gateway.shell import GATEWAY, shadebus, within
 
 Arguments = list[str | Path]
 # Nothing is forbidden to root, so the command gives its rights up, once it has loaded what only root may read.
@@ -165,7 +165,7 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
 @pytest.mark.parametrize("case", CASES)
 def test_a_mistake_is_one_line_that_names_it_and_the_mend(case: str, tmp_path: Path) -> None:
     arguments, fragments = CASES[case]
-    done = shadebus(*arguments(tmp_path))
+    done = within(*arguments(tmp_path))
     assert done.returncode == 1
     complaint, *more = [text for text in done.stderr.splitlines() if not text.startswith("no terrain given")]
     assert more == []
@@ -184,7 +184,7 @@ def test_a_line_without_permission_is_named_with_the_group_to_join() -> None:
 
 
 def test_a_start_that_failed_leaves_no_recording(tmp_path: Path) -> None:
-    assert shadebus(*source("--record", tmp_path)).returncode == 1
+    assert within(*source("--record", tmp_path)).returncode == 1
     assert [*tmp_path.iterdir()] == []
 
 
@@ -199,7 +199,7 @@ height_m = 761.0
 heading_deg = 197.6
 """,
     )
-    done = shadebus("simulate", scenario, "--to", f"file:{tmp_path / 'out'}")
+    done = within("simulate", scenario, "--to", f"file:{tmp_path / 'out'}")
     assert done.returncode == 1
     assert done.stderr.startswith("shadebus: simulation: ")
     assert done.stderr.count("\n") == 1
@@ -267,7 +267,7 @@ def test_another_group_is_to_be_joined(tmp_path: Path) -> None:
 
 def test_a_directory_without_permission_is_named(tmp_path: Path) -> None:
     with PtyOutlet() as line:
-        done = shadebus("run", "--source", f"serial:{line.path}", "--record", "/proc/no-such-directory")
+        done = within("run", "--source", f"serial:{line.path}", "--record", "/proc/no-such-directory")
     assert done.returncode == 1
     assert "shadebus: cannot record to /proc/no-such-directory/" in done.stderr
     assert "choose another directory" in done.stderr
@@ -281,13 +281,14 @@ def test_terrain_that_changed_since_the_recording_is_named(tmp_path: Path) -> No
     content = bytearray(dem.read_bytes())
     content[1000] ^= 1
     dem.write_bytes(content)
-    done = shadebus("replay", tmp_path / "a.mcap")
+    done = within("replay", tmp_path / "a.mcap")
     assert done.returncode == 1
     assert f"{dem} changed since the recording was made: name the terrain to use with --dem" in done.stderr
-    assert shadebus("replay", tmp_path / "a.mcap", "--dem", TERRAIN).returncode == 0
+    assert within("replay", tmp_path / "a.mcap", "--dem", TERRAIN).returncode == 0
 
 
 def test_the_module_and_the_installed_command_are_the_same() -> None:
     command = Path(sys.executable).with_name("shadebus")
     done = subprocess.run([command, "decode", "708", "zz"], capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stderr) == (1, shadebus("decode", "708", "zz").stderr)
+    assert done.stderr == within("decode", "708", "zz").stderr

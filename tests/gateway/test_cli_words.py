@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from gateway.cli import app
 from simulators import arinc429
 from tests.decoders.bus import word429
-from tests.gateway.shell import shadebus
+from tests.gateway.shell import shadebus, within
 
 HEAVY = ("numpy", "numba", "scipy", "rasterio", "mcap", "matplotlib", "serial", "pydantic")
 VERBS = (
@@ -93,7 +93,7 @@ def test_a_radar_header_is_explained_field_by_field() -> None:
 
 def test_a_whole_radar_word_has_its_bins_counted_by_level() -> None:
     word = "b443047a0e80767c" + "ff" * 3 + "00" * 189
-    found = rows(shadebus("decode", "708", word).stdout)[16:]
+    found = rows(within("decode", "708", word).stdout)[16:]
     assert found == [
         ["bins", "64-1599", "", "512", "", "of 3 bits, 578.8 m each"],  # 160 NM of 1852 m
         ["black", "", "000", "504", "bins", ""],
@@ -104,7 +104,7 @@ def test_a_whole_radar_word_has_its_bins_counted_by_level() -> None:
 def test_what_is_unusual_in_a_radar_word_is_noted() -> None:
     bits = 0o057 | 7 << 26 | 1 << 12 | 1 << 48 | 1 << 63  # label 364 in wire order
     word = bits.to_bytes(8, "little").hex() + "05" + "00" * 191
-    notes = {row[0]: row[5] for row in rows(shadebus("decode", "708", word).stdout) if "UNUSUAL" in row[5]}
+    notes = {row[0]: row[5] for row in rows(within("decode", "708", word).stdout) if "UNUSUAL" in row[5]}
     spare, reserved = "UNUSUAL: a spare bit is set", "UNUSUAL: a reserved code"
     assert notes == {
         "label": "UNUSUAL: arinc708 has 055, 057",
@@ -120,7 +120,7 @@ def test_a_radar_word_is_explained_by_a_profile_of_ones_own(tmp_path: Path) -> N
     own = tmp_path / "own.toml"
     own.write_text('[own]\nextends = "arinc708a"\nscan_angle_zero = "tail"\nscan_angle_sense = "counterclockwise"\n')
     header = (0xB4 | 7 << 26 | 1024 << 51).to_bytes(8, "little").hex()
-    found = {row[0]: row[3:] for row in rows(shadebus("decode", "708", header, "--profile", own).stdout)}
+    found = {row[0]: row[3:] for row in rows(within("decode", "708", header, "--profile", own).stdout)}
     assert found["mode"] == ["windshear_icon", "", ""]
     assert found["scan_angle"] == ["+90.000", "deg", "clockwise from the nose; sent counterclockwise from the tail"]
 
@@ -128,7 +128,7 @@ def test_a_radar_word_is_explained_by_a_profile_of_ones_own(tmp_path: Path) -> N
 def test_a_mistake_in_a_profile_of_ones_own_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text('[own]\nextends = "arinc708"\nbin = 3\n')
     for name, complaint in (("own.toml", "own.toml:3 [own] bin: Unexpected"), ("no.toml", "no.toml cannot be read")):
-        done = shadebus("decode", "708", "b443047a0e80767c", "--profile", tmp_path / name)
+        done = within("decode", "708", "b443047a0e80767c", "--profile", tmp_path / name)
         assert done.returncode == 1
         assert complaint in done.stderr
         assert done.stderr.count("\n") == 1
@@ -136,7 +136,7 @@ def test_a_mistake_in_a_profile_of_ones_own_is_one_line(tmp_path: Path) -> None:
 
 def test_arinc_429_words_are_explained_field_by_field() -> None:
     good, bad = arinc429.encode(0o324, -2.5), arinc429.encode(0o324, -2.5) ^ 1 << 31
-    done = shadebus("decode", "429", f"{good:08x}", f"0X{bad:08X}")
+    done = within("decode", "429", f"{good:08x}", f"0X{bad:08X}")
     assert done.returncode == 0
     found = [row for row in rows(done.stdout) if row[0] != "field"]
     names = [row[0] for row in found]
@@ -154,7 +154,7 @@ def test_arinc_429_words_are_explained_field_by_field() -> None:
 
 
 def test_a_label_that_the_set_does_not_have_is_said_to_be_unknown() -> None:
-    found = {row[0]: row[1:] for row in rows(shadebus("decode", "429", "00 00 00 00", "--set", "ra_707").stdout)}
+    found = {row[0]: row[1:] for row in rows(within("decode", "429", "00 00 00 00", "--set", "ra_707").stdout)}
     assert found["label"][2] == "not in ra_707"
     assert found["SDI"][2] == found["SSM"][2] == "depends on the label"
     assert found["value"][1] == "none"
@@ -165,12 +165,12 @@ def test_what_a_word_or_a_label_file_says_is_printed_as_it_stands(tmp_path: Path
     own = tmp_path / "own.toml"
     row = "name = '[b]Roll[/] [deg]', encoding = 'iso5', bits = [9, 29], source = '[/p. 3]', confidence = ':x:'"
     own.write_text(f"[own]\nequipment_id = 1\nrows = [{{ label = '356', {row} }}]\n")
-    (listed,) = rows(shadebus("labels", "--set", own).stdout)[1:]
+    (listed,) = rows(within("labels", "--set", own).stdout)[1:]
     assert (listed[1], listed[-2:]) == ("[b]Roll[/] [deg]", [":x:", "[/p. 3]"])
     for said in ("[/]", "[b]", ":x:"):
         text = sum(ord(character) << 7 * k for k, character in enumerate(said))
         word = word429(0o356, {9: (text, 21)})
-        done = shadebus("decode", "429", f"{word:08x}", "--set", own)
+        done = within("decode", "429", f"{word:08x}", "--set", own)
         assert {row[0]: row[3] for row in rows(done.stdout)}["value"] == "NORMAL"
         assert {row[0]: row[2] for row in rows(done.stdout)}["value"] == repr(said)
 
@@ -178,11 +178,11 @@ def test_what_a_word_or_a_label_file_says_is_printed_as_it_stands(tmp_path: Path
 def test_doctor_prints_the_names_of_places_as_they_stand(tmp_path: Path) -> None:
     place = tmp_path / "[" / ":x:]"
     place.mkdir(parents=True)
-    assert str(place) in shadebus("doctor", "--record", place).stdout
+    assert str(place) in within("doctor", "--record", place).stdout
 
 
 def test_thresholds_are_those_of_the_published_table() -> None:
-    found = rows(shadebus("thresholds").stdout)
+    found = rows(within("thresholds").stdout)
     assert found == [
         ["60", "2", "1e-01", "1e-05", "74.40", "3.53"],
         ["60", "2", "1e-03", "1e-03", "99.61", "3.70"],
@@ -194,7 +194,7 @@ def test_thresholds_are_those_of_the_published_table() -> None:
 
 
 def test_thresholds_of_ones_own_configuration() -> None:
-    done = shadebus("thresholds", "--n", "60", "--n", "120", "--sigma-c", "2", "--p-fa", "1e-3", "--p-md", "1e-3")
+    done = within("thresholds", "--n", "60", "--n", "120", "--sigma-c", "2", "--p-fa", "1e-3", "--p-md", "1e-3")
     found = rows(done.stdout)
     assert [row[0] for row in found] == ["60", "120"]
     assert found[0][4:] == ["99.61", "3.70"]
@@ -225,7 +225,7 @@ def test_doctor_looks_at_everything_and_its_exit_code_is_its_finding(tmp_path: P
 
 
 def test_doctor_names_a_directory_that_takes_no_recording() -> None:
-    done = shadebus("doctor", "--record", "/proc")
+    done = within("doctor", "--record", "/proc")
     found = {row[0]: row[1:] for row in rows(done.stdout)}
     assert found["disk writes"][0] == "lacks"
     assert "\ndisk writes: choose a directory you can write\n" in done.stdout
@@ -233,9 +233,9 @@ def test_doctor_names_a_directory_that_takes_no_recording() -> None:
 
 
 def test_the_label_sets_are_listed_and_every_label_of_one_with_what_it_means() -> None:
-    sets = {row[0]: row[1:] for row in rows(shadebus("labels").stdout)}
+    sets = {row[0]: row[1:] for row in rows(within("labels").stdout)}
     assert sets["gnss_743a"][0] == "00B"
-    listed = {row[0]: row[1:] for row in rows(shadebus("labels", "--set", "gnss_743a").stdout) if row[0]}
+    listed = {row[0]: row[1:] for row in rows(within("labels", "--set", "gnss_743a").stdout) if row[0]}
     assert len(listed) - 1 == int(sets["gnss_743a"][1])  # its heading apart
     assert listed["110"][:6] == ["GNSS latitude", "bnr", "9-29", "180", "0.000171661377", "deg"]
     assert listed["130"][2] == "12-28, satellite_failure 11"
@@ -243,7 +243,7 @@ def test_the_label_sets_are_listed_and_every_label_of_one_with_what_it_means() -
 
 
 def test_a_set_that_there_is_not_is_named_with_those_there_are() -> None:
-    done = shadebus("labels", "--set", "gnss_744")
+    done = within("labels", "--set", "gnss_744")
     assert done.returncode == 1
     assert "'gnss_744'" in done.stderr
     assert "gnss_743a" in done.stderr
@@ -251,16 +251,16 @@ def test_a_set_that_there_is_not_is_named_with_those_there_are() -> None:
 
 def test_the_discrete_bits_of_a_word_are_explained_beside_its_value() -> None:
     word = word429(0o130, {11: (1, 1), 12: (2**13, 17)}, ssm=3)
-    found = {row[0]: row[1:] for row in rows(shadebus("decode", "429", f"{word:08x}", "--set", "gnss_743a").stdout)}
+    found = {row[0]: row[1:] for row in rows(within("decode", "429", f"{word:08x}", "--set", "gnss_743a").stdout)}
     assert found["satellite_failure"] == ["11", "1", "1"]
     assert found["value"] == ["12-28", "1 NM", "NORMAL"]
-    damaged = rows(shadebus("decode", "429", f"{word ^ 1 << 31:08x}", "--set", "gnss_743a").stdout)
+    damaged = rows(within("decode", "429", f"{word ^ 1 << 31:08x}", "--set", "gnss_743a").stdout)
     assert {row[0]: row[3] for row in damaged}["satellite_failure"] == "not to be trusted"
 
 
 @pytest.mark.parametrize(("ssm", "sign", "value"), [(0, "plus", "20.5 ft"), (3, "minus", "-20.5 ft")])
 def test_the_matrix_of_a_decimal_word_is_its_sign(ssm: int, sign: str, value: str) -> None:
     word = word429(0o165, {11: (0x0205, 19)}, ssm)
-    found = {row[0]: row[1:] for row in rows(shadebus("decode", "429", f"{word:08x}", "--set", "ra_707").stdout)}
+    found = {row[0]: row[1:] for row in rows(within("decode", "429", f"{word:08x}", "--set", "ra_707").stdout)}
     assert found["SSM"][2] == f"NORMAL, {sign}"
     assert found["value"][1] == value

@@ -14,7 +14,7 @@ from simulators.outlets import Closed, PtyOutlet
 from simulators.player import play
 from tests.gateway.conftest import TERRAIN
 from tests.gateway.live import recorded_bytes, replayed, wait_until
-from tests.gateway.shell import Running, shadebus
+from tests.gateway.shell import Running, shadebus, within
 
 
 def the_recording(directory: Path) -> Path:
@@ -48,16 +48,16 @@ def test_run_and_replay_print_the_same_bytes(
     assert (again.returncode, again.stderr) == (0, "")
     assert again.stdout == gateway.output.decode()
     assert again.stdout.count('"type":"integrity"') == 3
-    late = shadebus("replay", path, "--json", "--start", "0.4").stdout
+    late = within("replay", path, "--json", "--start", "0.4").stdout
     assert 0 < len(late) < len(again.stdout)
     assert again.stdout.endswith(late)
 
-    info = shadebus("info", path).stdout
+    info = within("info", path).stdout
     assert "closed with its index" in info
     assert f"{len(stream)} of them from the buses" in info
     assert str(TERRAIN) in info
 
-    dump = shadebus("dump", path)
+    dump = within("dump", path)
     assert dump.stderr == ""
     counters = json.loads(gateway.lines[-1])["counters"]
     assert dump.stdout.count("  429  ") == counters["bridge0.words_429"] > 500
@@ -69,7 +69,7 @@ def test_run_and_replay_print_the_same_bytes(
     assert head.stdout == gateway.lines[0] + "\n"
     assert "Traceback" not in head.stderr and "Exception" not in head.stderr
 
-    person = shadebus("replay", path)
+    person = within("replay", path)
     assert person.stdout.count("scan 0:") == 2
     assert "bins2" in person.stdout
 
@@ -106,7 +106,7 @@ def test_a_killed_gateway_leaves_a_recording_that_every_verb_reads(
     again = "".join(text + "\n" for text in replayed(path))
     assert again.startswith(printed)
     assert '"type":"summary"' not in printed
-    assert "the file ends without its index" in shadebus("info", path).stdout
+    assert "the file ends without its index" in within("info", path).stdout
     dump = shadebus("dump", path)
     assert dump.returncode == 0
     assert "the file ends without its index" in dump.stderr

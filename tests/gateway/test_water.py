@@ -18,7 +18,7 @@ from gateway.reprocess.job import Job, jobs
 from gateway.reprocess.work import key, work
 from simulators.scenario import BUILT_IN_TERRAIN
 from tests.gateway.flown import record_flight
-from tests.gateway.shell import shadebus
+from tests.gateway.shell import shadebus, within
 
 TERRAIN = BUILT_IN_TERRAIN["white_mountains"]
 
@@ -52,7 +52,7 @@ def test_a_recording_keeps_its_water_and_is_judged_with_it(tmp_path: Path) -> No
     assert live.water.checksum == again.water.checksum == recording.metadata["water_checksum"] != ""
     wet = again.water.on(again.terrain).wet.sum(), live.water.on(live.terrain).wet.sum()
     assert wet == (120 * 120, 120 * 120), "0.1 degrees of posts 3 seconds apart"
-    shown = shadebus("info", recording.path).stdout
+    shown = within("info", recording.path).stdout
     assert recording.metadata["water_checksum"] in shown
     assert "lake.geojson" in "".join(shown.split())
 
@@ -87,7 +87,7 @@ def sea(tmp_path: Path) -> Path:
 
 
 def test_a_replay_takes_other_water_by_name(flight: Path, sea: Path) -> None:
-    refused = shadebus("replay", flight)
+    refused = within("replay", flight)
     assert (refused.returncode, "name the water to use with --water" in refused.stderr) == (1, True)
     replayed = shadebus("replay", flight, "--json", "--water", sea)
     assert replayed.returncode == 0, replayed.stderr

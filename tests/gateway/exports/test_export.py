@@ -12,7 +12,7 @@ from gateway.recording import Recorder, Recording
 from gateway.stopping import Stop
 from tests.gateway.exports.recorded import TERRAIN, Flown, To, record
 from tests.gateway.made import IRU, RACK, Bridge, raw
-from tests.gateway.shell import GATEWAY, START_S, limited, shadebus
+from tests.gateway.shell import GATEWAY, START_S, limited, shadebus, within
 
 
 def test_the_verb_says_what_it_wrote(flown: Flown, tmp_path: Path) -> None:
@@ -39,7 +39,7 @@ def test_a_disk_that_is_full_is_one_line_and_leaves_nothing_behind(flown: Flown,
 
 
 def test_dump_shows_the_words_of_one_label_of_a_channel(flown: Flown) -> None:
-    done = shadebus("dump", flown.path, "--label", "314", "--adapter", "bridge", "--channel", "1")
+    done = within("dump", flown.path, "--label", "314", "--adapter", "bridge", "--channel", "1")
     lines = done.stdout.splitlines()
     reversed_label = int(f"{0o314:08b}"[::-1], 2)
     assert len(lines) == sum(isinstance(one.word, int) and one.word & 0xFF == reversed_label for one in flown.of(1))

@@ -13,7 +13,7 @@ from gateway.recording.session import file_of_session, sessions
 from gateway.recording.verify import verify
 from tests.gateway.made import raw, status, tick
 from tests.gateway.recording.written import made
-from tests.gateway.shell import shadebus
+from tests.gateway.shell import within
 
 
 def session(directory: Path, files: int) -> Path:
@@ -56,7 +56,7 @@ def test_a_file_that_a_session_lacks_is_told_by_each_command(verb: str, tmp_path
         "simulate": ["--to", f"file:{out}"],
     }
     names = ["--from", first] if verb == "simulate" else [first]
-    done = shadebus(verb, *names, *arguments.get(verb, []))
+    done = within(verb, *names, *arguments.get(verb, []))
     told = done.stdout + done.stderr
     assert "2 missing records" in told or "2 records are missing" in told, told
     assert done.returncode == (1 if verb == "replay" else 0)

@@ -21,7 +21,7 @@ from tests.gateway.live import replayed
 from tests.gateway.made import UTC_NS, raw, stamp, status, tick
 from tests.gateway.recording.disks import break_down, breaking_disk, fill, needs_mount, small_disk
 from tests.gateway.recording.written import made
-from tests.gateway.shell import WIDE, shadebus
+from tests.gateway.shell import WIDE, shadebus, within
 from tests.gateway.vendor_files import rdr4b
 from tests.golden.make import HERE
 
@@ -29,7 +29,7 @@ GOLDEN = HERE / "format2.mcap"
 
 
 def test_a_sound_recording_is_called_so_and_its_notes_are_told() -> None:
-    done = shadebus("verify", GOLDEN)
+    done = within("verify", GOLDEN)
     assert done.returncode == 0
     assert done.stdout.splitlines() == [
         "  record 170 says: UTC of the host stepped by +0.250 s",
@@ -48,7 +48,7 @@ def test_a_damaged_place_a_torn_end_and_a_gap_are_each_told(tmp_path: Path) -> N
     assert "the CRC of a raw chunk is wrong" in place
     assert "are missing" in torn or "are missing" in gap
     assert (found.count, found.missing) == (3, 1)
-    done = shadebus("verify", damaged, GOLDEN)
+    done = within("verify", damaged, GOLDEN)
     assert done.returncode == 1
     assert "NOT sound: 3 problems, 1 records missing" in done.stdout
     assert done.stdout.splitlines()[-1] == f"{GOLDEN}: 284 records in 1 files: sound"
@@ -80,7 +80,7 @@ def test_a_torn_recording_is_recovered_with_its_metadata_and_a_note_and_never_ov
     torn = tmp_path / "torn.mcap"
     torn.write_bytes(GOLDEN.read_bytes()[:60_000])
     before = list(Recording(torn))
-    done = shadebus("recover", torn)
+    done = within("recover", torn)
     assert done.returncode == 0
     assert "written to" in done.stdout and "ends without its index" in done.stdout
     whole = Recording(tmp_path / "torn.recovered.mcap")
@@ -90,7 +90,7 @@ def test_a_torn_recording_is_recovered_with_its_metadata_and_a_note_and_never_ov
     assert "its last" in note.text and "bytes are no whole record" in note.text
     assert not whole.torn and verify(whole).problems == []
     assert {key: whole.metadata[key] for key in Recording(GOLDEN).metadata} == Recording(GOLDEN).metadata
-    again = shadebus("recover", torn)
+    again = within("recover", torn)
     assert again.returncode == 1
     assert "is there already: name another file with -o" in again.stderr
 
@@ -123,7 +123,7 @@ def test_a_sequence_that_nothing_vouches_for_leaves_no_record_out(tmp_path: Path
 
 def test_of_several_recordings_each_is_verified_whatever_the_others_are(tmp_path: Path) -> None:
     good = made(tmp_path / "a.mcap", [tick(0, 0)])
-    done = shadebus("verify", tmp_path / "none.mcap", good)
+    done = within("verify", tmp_path / "none.mcap", good)
     assert done.returncode == 1
     assert f"{tmp_path / 'none.mcap'}: NOT sound: cannot read" in done.stdout
     assert f"{good}: 1 records in 1 files: sound" in done.stdout
@@ -138,7 +138,7 @@ def test_what_cannot_be_read_in_the_middle_does_not_keep_others_from_being_verif
         subprocess.run(["sync", "-f", disk], check=True)
         Path("/proc/sys/vm/drop_caches").write_text("1")
         break_down(disk)
-        done = shadebus("verify", one, broken, other)
+        done = within("verify", one, broken, other)
     assert (done.returncode, done.stderr) == (1, "")
     first, second, third = done.stdout.splitlines()
     assert first.startswith(f"{one}: NOT sound: cannot read recording {tmp_path / 'a.0002.mcap'}")
@@ -155,7 +155,7 @@ def test_a_file_without_a_configuration_is_named_with_the_mend_and_one_without_a
         recorder.close()
     bare = tmp_path / "bare.mcap"
     for command in (("replay", bare), ("simulate", "--from", bare), ("merge", bare, "-o", tmp_path / "new.mcap")):
-        done = shadebus(*command)
+        done = within(*command)
         assert done.returncode == 1
         told = "holds no configuration that this version understands: look for another copy, or update shadebus if"
         assert f"{bare} {told}" in done.stderr
@@ -242,7 +242,7 @@ def test_cuts_that_are_wrong_name_the_mend_and_leave_no_file(tmp_path: Path) -> 
         (("--start", "noon"), "'noon' is no time: write seconds, or UTC as"),
         (("--start", "99"), "has nothing from 99.0 to the end: `shadebus info` tells its times"),
     ):
-        done = shadebus("cut", GOLDEN, *more, "-o", tmp_path / "b.mcap")
+        done = within("cut", GOLDEN, *more, "-o", tmp_path / "b.mcap")
         assert done.returncode == 1 and words in done.stderr
     assert [*tmp_path.iterdir()] == []
 
@@ -373,7 +373,7 @@ def test_info_tells_files_format_damage_and_how_the_disk_did(tmp_path: Path) -> 
     data = bytearray(GOLDEN.read_bytes())
     data[40_000] ^= 1
     (tmp_path / "a.mcap").write_bytes(data)
-    text = shadebus("info", tmp_path / "a.mcap").stdout
+    text = within("info", tmp_path / "a.mcap").stdout
     rows = {row.split("│")[1].strip(): row.split("│")[2].strip() for row in text.splitlines() if row.startswith("│")}
     assert (rows["files"], rows["format"], rows["records"]) == (
         "a.mcap",
