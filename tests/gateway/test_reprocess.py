@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from gateway.config import load_config
 from gateway.errors import GatewayError
 from gateway.events import IntegrityEvent
 from gateway.metadata import recorded_config, recorded_monitor
@@ -306,31 +308,30 @@ def test_a_rack_file_that_does_not_fit_the_recording_is_refused(
     flights: Path, tmp_path: Path, name: str, source: str, said: str
 ) -> None:
     (tmp_path / "rack.toml").write_text(f'[[adapters]]\nname = "{name}"\nsource = "{source}"\n')
-    run = shadebus("reprocess", flights, "-o", tmp_path / "out", "-c", tmp_path / "rack.toml")
-    assert run.returncode == 1
-    assert said in run.stderr
+    (job,) = jobs(flights / "flight0.mcap", load_config(tmp_path / "rack.toml"), ())
+    with pytest.raises(GatewayError, match=said):
+        work(job)
 
 
-def test_a_directory_without_recordings_and_a_scheduler_that_is_not_there_are_named(
-    tmp_path: Path, flights: Path
-) -> None:
-    empty = shadebus("reprocess", tmp_path, "-o", tmp_path / "out")
-    assert "holds no recordings" in empty.stderr
-    alone = shadebus("reprocess", flights, "-o", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:9")
-    assert "no Dask scheduler answers at tcp://127.0.0.1:9" in alone.stderr
-    assert (empty.returncode, alone.returncode) == (1, 1)
+def test_a_directory_without_recordings_is_named(tmp_path: Path) -> None:
+    with pytest.raises(GatewayError, match=f"{tmp_path} holds no recordings"):
+        jobs(tmp_path, None, ())
 
 
-@pytest.mark.parametrize("address", ["nonsense", "tls://127.0.0.1:9"])
-def test_an_address_that_can_be_no_scheduler_is_refused_with_the_mend(
-    flights: Path, tmp_path: Path, address: str
-) -> None:
-    # In a process of its own: a client that failed leaves Dask's threads in it.
-    done = shadebus("reprocess", flights, "-o", tmp_path, "--scheduler", address)
-    assert done.returncode == 1
-    (line,) = done.stderr.splitlines()
-    assert f"no Dask scheduler answers at {address}: " in line
-    assert "; start dask scheduler and give the address" in line
+def test_an_address_at_which_no_scheduler_answers_is_refused_with_the_mend(flights: Path, tmp_path: Path) -> None:
+    addresses = "nonsense", "tls://127.0.0.1:9", "tcp://127.0.0.1:9"
+
+    def refused(address: str) -> "subprocess.CompletedProcess[str]":
+        # In a process of its own: a client that failed leaves Dask's threads in it.
+        return shadebus("reprocess", flights, "-o", tmp_path, "--scheduler", address)
+
+    with ThreadPoolExecutor() as at_once:  # they wait for an answer
+        found = at_once.map(refused, addresses)
+    for address, done in zip(addresses, found, strict=True):
+        assert done.returncode == 1
+        (line,) = done.stderr.splitlines()
+        assert f"no Dask scheduler answers at {address}: " in line
+        assert "; start dask scheduler and give the address" in line
 
 
 class Cluster:
