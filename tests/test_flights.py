@@ -99,12 +99,12 @@ def test_an_alert_names_the_shift_that_explains_it_and_no_other_verdict_names_on
         assert scan.verdict.offset_east_m == pytest.approx(500, abs=100)
         assert scan.verdict.offset_north_m == pytest.approx(-300, abs=100)
         assert (scan.verdict.offset_confidence or 0) > 0.9
-    (fine, *_) = fly(Flight(low_pass(), WHITE_MOUNTAINS, P_FA, load_calibration(CALIBRATION)))
+    (fine,) = fly(Flight(low_pass(sweeps=1), WHITE_MOUNTAINS, P_FA, load_calibration(CALIBRATION)))
     assert fine.verdict.offset_east_m is None
 
 
 def test_shadows_without_a_partner_alert_where_the_terrain_is_another(shifted: Path) -> None:
-    (scan, *_) = fly(Flight(low_pass(), shifted, P_FA, load_calibration(CALIBRATION)))
+    (scan,) = fly(Flight(low_pass(sweeps=1), shifted, P_FA, load_calibration(CALIBRATION)))
     found = scan.verdict
     assert found.unmatched_dem is not None
     assert found.unmatched_dem_limit is not None

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -50,14 +51,18 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Shown:
     return Shown(printed.getvalue(), page, sorted(out.glob("*/*.mcap")))
 
 
-def test_no_reason_of_a_verdict_speaks_of_the_end_of_the_demo_itself(shown: Shown) -> None:
-    events = [json.loads(line) for recording in shown.recordings for line in replayed(recording)]
+@pytest.fixture(scope="module")
+def events(shown: Shown) -> list[dict[str, Any]]:
+    """Of all legs, one after the other."""
+    return [json.loads(line) for recording in shown.recordings for line in replayed(recording)]
+
+
+def test_no_reason_of_a_verdict_speaks_of_the_end_of_the_demo_itself(events: list[dict[str, Any]]) -> None:
     assert [event for event in events if event["type"] == "status" and event["state"] == "LOST"] == []
     assert [event["reasons"] for event in events if "degraded" in str(event.get("reasons"))] == []
 
 
-def test_the_last_word_of_a_leg_is_recorded_although_the_gateway_is_stopped_first(shown: Shown) -> None:
-    events = [json.loads(line) for recording in shown.recordings for line in replayed(recording)]
+def test_the_last_word_of_a_leg_is_recorded_although_the_gateway_is_stopped_first(events: list[dict[str, Any]]) -> None:
     assert [event["radials"] for event in events if event["type"] == "scan"] == [361] * 9
 
 
