@@ -67,7 +67,7 @@ def compare(
     screens: Screens = NO_SCREENS,
 ) -> tuple[Comparison, list[str]]:
     """Compare on some radials of a scan, (n,) like the pointing; and what of it was left out, and why."""
-    s, bins = settings, scan.bins.shape[1]
+    s, bins, pointing = settings, scan.bins.shape[1], pointing.over(terrain.extent)
     bin_width_m = scan.range_nm * NM_M / bins
     limit = bins if s.range_limit_nm is None else max(1, min(bins, int(bins * s.range_limit_nm / scan.range_nm)))
     beam = Beam.of(s)

@@ -12,7 +12,8 @@ def uncovered(height_over_ground_m: NDArray[np.float64], extent: Extent, pointin
     lat, lon = pointing.latitude_deg, pointing.longitude_deg
     unknown = np.isnan(height_over_ground_m)
     south, north, west, east = extent
-    outside = unknown & ((lat < south) | (lat > north) | (lon < west) | (lon > east))
+    framed = extent.framed(lon)
+    outside = unknown & ((lat < south) | (lat > north) | (framed < west) | (framed > east))
     reasons = []
     if outside.any():
         k = int(np.argmax(outside))

@@ -11,7 +11,7 @@ GRID: Final = Path(__file__).with_name("data") / "egm96_15min.tif"
 
 def undulation_m(latitude_deg: float, longitude_deg: float) -> float:
     """EGM96 undulation in metres at WGS 84 degrees: h = H + N, bilinear in a grid of 15 arc-minutes."""
-    return float(_grid().elevation(latitude_deg, (longitude_deg + 180) % 360 - 180))
+    return float(_grid().elevation(latitude_deg, longitude_deg))
 
 
 @cache

@@ -96,7 +96,7 @@ class Monitor:
         doubts += self._beyond_calibration(comparison.height_m)
         if self.settings.tracked_scans > 1:
             every, known, _ = point(scan, aircraft, steady, self.settings)
-            fronts = fronts_of(scan, steady[known], every, here.grid, self.settings)
+            fronts = fronts_of(scan, steady[known], every.over(here.extent), here.grid, self.settings)
             self._tracker.add(int(scan.time_ns[-1]), fronts)
         verdict, of_itself = self._decide(scan, comparison, doubts, reasons)
         if of_itself and self.settings.offset_search_m:

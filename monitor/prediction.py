@@ -17,7 +17,7 @@ from monitor.ceiling import clear_m
 from monitor.geodesy import Ray, along, bend, curvature_radii, ray
 from monitor.settings import MonitorSettings
 from monitor.shade import DEM_INITIAL, walk
-from monitor.terrain import Grid, Real, bilinear, blend, corners, locate, sample
+from monitor.terrain import Extent, Grid, Real, bilinear, blend, corners, locate, sample
 
 SETTLED = 0.1  # of a bin: how far a bin's ground may move it and its place still counts as found
 LEVELS = (16, 4, 1)  # bins whose ground is looked up at once: every 16th, every fourth, every one
@@ -55,6 +55,10 @@ class Pointing(NamedTuple):
     height_m: NDArray[np.float64]
     azimuth_rad: NDArray[np.float64]
     elevation_rad: NDArray[np.float64]
+
+    def over(self, extent: Extent) -> "Pointing":
+        """The same, with longitudes on the scale of the terrain that is looked at: the kernels know no date line."""
+        return self._replace(longitude_deg=extent.framed(self.longitude_deg))
 
 
 class Bins(NamedTuple):

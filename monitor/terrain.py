@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from monitor.ceiling import ceilings
 from monitor.geodesy import curvature_radii
-from monitor.terrain_files import Part, TerrainError, TerrainFiles
+from monitor.terrain_files import TURN_DEG, Part, TerrainError, TerrainFiles
 
 Real = Any  # of single or double precision
 
@@ -47,7 +47,7 @@ class Grid(NamedTuple):
 
 
 class Extent(NamedTuple):
-    """Latitudes and longitudes of the outermost posts, degrees."""
+    """Latitudes and longitudes of the outermost posts, degrees; `west` is below `east` across the date line too."""
 
     south: float
     north: float
@@ -58,6 +58,19 @@ class Extent(NamedTuple):
     def of(cls, rows: int, columns: int, north_deg: float, west_deg: float, row_deg: float, column_deg: float) -> Self:
         """Of so many posts from the north-western one on."""
         return cls(north_deg - (rows - 1) * row_deg, north_deg, west_deg, west_deg + (columns - 1) * column_deg)
+
+    def framed(self, longitude_deg: ArrayLike) -> NDArray[np.float64]:
+        """The same longitudes, any shape, on one scale with `west` and `east`."""
+        return beside((self.west + self.east) / 2, longitude_deg)
+
+
+def beside(meridian_deg: float, longitude_deg: ArrayLike) -> NDArray[np.float64]:
+    """The same longitudes, any shape, within half a turn of a meridian; those that are there stay so to the bit.
+
+    What is no longitude, as NaN or 1e300, does not become one: no longitude needs more than two turns.
+    """
+    given = np.asarray(longitude_deg, float)
+    return given + TURN_DEG * np.clip(np.round((meridian_deg - given) / TURN_DEG), -2, 2)
 
 
 class Terrain:
@@ -86,7 +99,7 @@ class Terrain:
 
     def elevation(self, latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> NDArray[np.float64]:
         """Heights in metres at WGS 84 degrees, any shape; NaN where a needed post is void or outside the files."""
-        lat, lon = np.broadcast_arrays(np.asarray(latitude_deg, float), np.asarray(longitude_deg, float))
+        lat, lon = np.broadcast_arrays(np.asarray(latitude_deg, float), self.extent.framed(longitude_deg))
         return self._elevation(lat.ravel(), lon.ravel()).reshape(lat.shape)
 
     def _elevation(self, lat: NDArray[np.float64], lon: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -118,8 +131,9 @@ class WideTerrain(Terrain):
         It ends on multiples of `BLOCK_DEG`, or where the files do: which one it is depends on nothing but the places
         and the reach, so that a replay looks at the same posts in the same order.
         """
+        lon = beside(float(self.extent.framed(longitude_deg.flat[0])), longitude_deg)
         south, north, west, east = (
-            float(end) for end in (latitude_deg.min(), latitude_deg.max(), longitude_deg.min(), longitude_deg.max())
+            float(end) for end in (latitude_deg.min(), latitude_deg.max(), lon.min(), lon.max())
         )
         high = BEYOND * math.degrees(reach_m / curvature_radii(math.radians(south))[0])
         farthest_deg = min(max(abs(south), abs(north)) + high, 89.0)

@@ -2,6 +2,9 @@
 
 Posts are indexed by pixel *centres*: GDAL widens the bounds of HGT and DTED cells by half a post, so the centres are
 the posts of the standard. Opening reads headers only, and no file stays open.
+
+Longitudes rise without a break across the grid, beyond 180 degrees or below -180 where the files do so together: the
+date line is a meridian like any other, and what looks a place up brings its longitude there (`Extent.framed`).
 """
 
 import math
@@ -19,13 +22,18 @@ from rasterio.crs import CRS
 from rasterio.enums import Resampling
 from rasterio.errors import RasterioError
 from rasterio.vrt import WarpedVRT
+from rasterio.warp import transform_bounds
 from rasterio.windows import Window
 
 WGS84 = CRS.from_epsg(4326)
+WGS84_EASTWARD = CRS.from_string("+proj=longlat +datum=WGS84 +lon_wrap=180 +no_defs")  # of longitudes from 0 to 360
 LOWEST_M, HIGHEST_M = -500.0, 9000.0  # no ground on Earth lies outside
+TURN_DEG = 360.0
+FINEST_DEG = 1e-9  # between posts: a tenth of a millimetre
 ALIGNMENT_POSTS = 0.05  # files whose posts miss a common grid by more are refused: resampling is not ours to hide
 POSTS_AT_ONCE = 40_000_000  # of a file: what is read is a few times as large as what becomes of it
 SAMPLE_BYTES, SAMPLE_EVERY = 4096, 1 << 20
+BEYOND_RING_DEG = 5.0  # at 70 degrees of latitude the longest range spans less
 
 
 class TerrainError(ValueError):
@@ -61,23 +69,35 @@ class Part(NamedTuple):
         corner = max(self.top, other.top), max(self.left, other.left)
         return Part(*corner, min(self.bottom, other.bottom), min(self.right, other.right))
 
+    def eastward(self, columns: int) -> "Part":
+        """As many rows and columns so far to the east."""
+        return self._replace(left=self.left + columns, right=self.right + columns)
+
 
 class TerrainFiles:
     """Files on one grid. Raises TerrainError, naming the file and the mend, for one that is not, or is no terrain."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self.paths = tuple(paths)
-        self._sheets = [_header(path) for path in paths]
-        first = self._sheets[0]
-        offsets = [_offset(sheet, first, path) for sheet, path in zip(self._sheets, paths, strict=True)]
+        found = [_header(path) for path in paths]
+        sheets = _in_one_run(found)
+        first = sheets[0]
+        offsets = [_offset(sheet, first, path) for sheet, path in zip(sheets, paths, strict=True)]
         top, left = min(row for row, _ in offsets), min(column for _, column in offsets)
-        self._parts = [
+        parts = [
             Part(row - top, column - left, row - top + sheet.rows, column - left + sheet.columns)
-            for (row, column), sheet in zip(offsets, self._sheets, strict=True)
+            for (row, column), sheet in zip(offsets, sheets, strict=True)
         ]
-        rows, columns = max(part.bottom for part in self._parts), max(part.right for part in self._parts)
-        north_deg, west_deg = first.north_deg - top * first.row_deg, first.west_deg + left * first.column_deg
-        self.whole = Sheet(rows, columns, north_deg, west_deg, first.row_deg, first.column_deg)
+        rows, columns = max(part.bottom for part in parts), max(part.right for part in parts)
+        beyond = _beyond_ring(columns, first.column_deg)
+        north_deg, west_deg = first.north_deg - top * first.row_deg, first.west_deg + (left - beyond) * first.column_deg
+        self.whole = Sheet(rows, columns + 2 * beyond, north_deg, west_deg, first.row_deg, first.column_deg)
+        turn = round(TURN_DEG / first.column_deg)
+        self._laid = [
+            (path, sheet, part.eastward(beyond + turns * turn))
+            for turns in ((0, -1, 1) if beyond else (0,))
+            for path, sheet, part in zip(paths, found, parts, strict=True)
+        ]
 
     def heights_m(self, part: Part) -> NDArray[np.float32]:
         """Heights of a part in metres, NaN where void or in no file; of overlapping files the first with a height wins.
@@ -86,7 +106,7 @@ class TerrainFiles:
         or is not what it was when it was opened.
         """
         height_m = np.full(part.shape, np.nan, np.float32)
-        for path, sheet, place in zip(self.paths, self._sheets, self._parts, strict=True):
+        for path, sheet, place in self._laid:
             top, left, bottom, right = part.common(place)
             if top >= bottom or left >= right:
                 continue
@@ -136,8 +156,10 @@ def _opened(path: Path) -> Iterator[rasterio.DatasetReader]:
             if source.crs == WGS84:
                 yield source
                 return
+            west, _, east, _ = transform_bounds(source.crs, WGS84, *source.bounds)
+            crs = WGS84 if west <= east else WGS84_EASTWARD  # GDAL's word for a file on both sides of the date line
             # The warped raster has corners that the source does not reach: NaN, or they would read as 0 m.
-            warp = {"crs": WGS84, "resampling": Resampling.bilinear, "nodata": math.nan, "dtype": "float32"}
+            warp = {"crs": crs, "resampling": Resampling.bilinear, "nodata": math.nan, "dtype": "float32"}
             with WarpedVRT(source, **warp) as geographic:
                 yield geographic
     except CPLE_BaseError as error:
@@ -163,7 +185,9 @@ def _sheet(source: rasterio.DatasetReader) -> Sheet:
     t = source.transform
     if t.b or t.d or t.a <= 0 or t.e >= 0:
         raise TerrainError(f"{source.name} is not a north-up raster: warp it with gdalwarp")
-    if not (t.f <= 90 - t.e and t.f + t.e * source.height >= -90 + t.e and math.isfinite(t.c)):
+    north, south, east = t.f, t.f + t.e * source.height, t.c + t.a * source.width
+    on_earth = north <= 90 - t.e and south >= -90 + t.e and abs(t.c) <= TURN_DEG and east <= 2 * TURN_DEG
+    if not (on_earth and min(t.a, -t.e) >= FINEST_DEG):
         raise TerrainError(f"{source.name} has posts at no latitude or longitude: mend it with gdal_edit.py -a_ullr")
     return Sheet(source.height, source.width, t.f + t.e / 2, t.c + t.a / 2, -t.e, t.a)
 
@@ -185,3 +209,31 @@ def _offset(sheet: Sheet, first: Sheet, path: Path) -> tuple[int, int]:
     if not same_spacing or max(abs(row - round(row)), abs(column - round(column))) > ALIGNMENT_POSTS:
         raise TerrainError(f"{path} is not on the grid of the first terrain file: warp it to that grid with gdalwarp")
     return round(row), round(column)
+
+
+def _in_one_run(sheets: Sequence[Sheet]) -> list[Sheet]:
+    """The same sheets, turned about the Earth so that they span the fewest degrees together.
+
+    They begin behind the widest gap between them, in whatever order they are named; those that need no turn stay as
+    they are to the bit.
+    """
+    west_deg = np.array([sheet.west_deg for sheet in sheets])
+    width_deg = np.array([sheet.columns * sheet.column_deg for sheet in sheets])
+    post_deg = sheets[0].column_deg  # by half of which rounding cannot move a file
+
+    def turns(start_deg: float) -> NDArray[np.float64]:
+        return np.floor((west_deg - start_deg + post_deg / 2) / TURN_DEG)
+
+    def span_posts(start_deg: float) -> int:
+        return round(float(np.max(west_deg - TURN_DEG * turns(start_deg) + width_deg) - start_deg) / post_deg)
+
+    begins = min(np.unique(west_deg).tolist(), key=span_posts)
+    moved_deg = west_deg - TURN_DEG * turns(begins)
+    return [sheet._replace(west_deg=west) for sheet, west in zip(sheets, moved_deg.tolist(), strict=True)]
+
+
+def _beyond_ring(columns: int, column_deg: float) -> int:
+    """How many columns are laid once more beyond either end of files that go all round the Earth; of others none."""
+    turn = TURN_DEG / column_deg
+    is_ring = columns >= round(turn) and abs(turn - round(turn)) < ALIGNMENT_POSTS
+    return math.ceil(BEYOND_RING_DEG / column_deg) if is_ring else 0

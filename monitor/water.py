@@ -31,7 +31,7 @@ from monitor.places import line, place
 from monitor.prediction import Pointing
 from monitor.shade import last_dark
 from monitor.terrain import Extent, Grid, Terrain, WideTerrain
-from monitor.terrain_files import WGS84
+from monitor.terrain_files import TURN_DEG, WGS84
 
 POLYGONS = (".geojson", ".json")
 Draw = Callable[[Grid], NDArray[np.bool_]]  # which posts of a grid are water
@@ -124,13 +124,17 @@ def _raster(path: Path, extent: Extent) -> Draw:
             raise WaterError(
                 f"water file {path} has {source.count} bands: one is needed, with 0 where there is no water"
             )
-        _meets(path, transform_bounds(source.crs, WGS84, *source.bounds), extent)
+        turns_deg = _turns_deg(path, transform_bounds(source.crs, WGS84, *source.bounds), extent)
 
     def draw(grid: Grid) -> NDArray[np.bool_]:
         rows, columns = grid.height_m.shape
-        warp = {"crs": WGS84, "transform": _transform(grid), "width": columns, "height": rows}
-        with rasterio.open(path) as source, WarpedVRT(source, **warp, resampling=Resampling.nearest) as posts:
-            return np.asarray(np.nan_to_num(posts.read(1, masked=True).filled(0)) != 0)
+        wet = np.zeros((rows, columns), bool)
+        for turn_deg in turns_deg:
+            there = _transform(grid._replace(west_deg=grid.west_deg - turn_deg))
+            warp = {"crs": WGS84, "transform": there, "width": columns, "height": rows}
+            with rasterio.open(path) as source, WarpedVRT(source, **warp, resampling=Resampling.nearest) as posts:
+                wet |= np.nan_to_num(posts.read(1, masked=True).filled(0)) != 0
+        return wet
 
     return draw
 
@@ -143,9 +147,14 @@ def _polygons(path: Path, extent: Extent) -> Draw:
         raise WaterError(f"water file {path} holds no polygons: draw the water as Polygon or MultiPolygon")
     if not all(_is_whole(shape) for shape in found):
         raise WaterError(f"water file {path} holds a polygon without closed rings of numbers: mend or remove it")
-    shapes = [shape if crs == WGS84 else transform_geom(crs, WGS84, shape) for shape in found]
+    shapes = found if crs == WGS84 else [part for shape in found for part in _areas(transform_geom(crs, WGS84, shape))]
     west, south, east, north = zip(*(bounds(shape) for shape in shapes), strict=True)
-    _meets(path, (min(west), min(south), max(east), max(north)), extent)
+    turns_deg = _turns_deg(path, (min(west), min(south), max(east), max(north)), extent)
+    shapes = [
+        {"type": shape["type"], "coordinates": _turned(shape["coordinates"], turn_deg)}
+        for turn_deg in turns_deg
+        for shape in shapes
+    ]
 
     def draw(grid: Grid) -> NDArray[np.bool_]:
         return np.asarray(rasterize(shapes, grid.height_m.shape, transform=_transform(grid), dtype="uint8") > 0)
@@ -196,13 +205,31 @@ def _transform(grid: Grid) -> Affine:
     return Affine(grid.column_deg, 0, west_deg, 0, -grid.row_deg, north_deg)
 
 
-def _meets(path: Path, box: tuple[float, float, float, float], extent: Extent) -> None:
+def _turned(coordinates: Any, turn_deg: float) -> Any:
+    """The coordinates of a GeoJSON geometry, turned about the Earth; rings that end on the date line go on there."""
+    if isinstance(coordinates[0], int | float):
+        return [coordinates[0] + turn_deg, *coordinates[1:]]
+    return [_turned(part, turn_deg) for part in coordinates]
+
+
+def _turns_deg(path: Path, box: tuple[float, float, float, float], extent: Extent) -> list[float]:
+    """By how many degrees, whole turns, what lies in a box is to be moved to lie on the terrain: mostly just 0.
+
+    Terrain on both sides of the date line has two, since maps of water are cut there (RFC 7946, section 3.1.9).
+    """
     west, south, east, north = box
-    if not (west <= extent.east and east >= extent.west and south <= extent.north and north >= extent.south):
+    east += 0 if west <= east else TURN_DEG  # GDAL's word for what crosses the date line
+    turns_deg = [
+        turn_deg
+        for turn_deg in TURN_DEG * np.arange(-2.0, 3.0)
+        if west + turn_deg <= extent.east and east + turn_deg >= extent.west
+    ]
+    if not (turns_deg and south <= extent.north and north >= extent.south):
         raise WaterError(
             f"water file {path} lies outside the terrain: it reaches from {south:.3f} to {north:.3f} N and "
             f"{west:.3f} to {east:.3f} E; name only those that the flight needs, or mend its reference system"
         )
+    return turns_deg
 
 
 def _large(wet: NDArray[np.bool_], grid: Grid, minimum_km2: float) -> NDArray[np.bool_]:

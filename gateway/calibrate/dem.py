@@ -67,6 +67,7 @@ def place_of(terrain: Terrain, at: str | None) -> Place:
     south, north, west, east = terrain.extent
     middle = [(south + north) / 2, (west + east) / 2]
     latitude, longitude = _numbers(at, 2, "--at takes LAT,LON in degrees, as 44.5,-71.5") if at else middle
+    longitude = float(terrain.extent.framed(longitude))
     ground = float(terrain.elevation(latitude, longitude))
     if math.isnan(ground):
         raise GatewayError(f"the terrain has no height at {latitude:.6f}, {longitude:.6f}: name a place in it by --at")
