@@ -30,13 +30,18 @@ OUR_NAMES = ("core", "host", "journal", "radar", "recording")  # of what tells e
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+# Kinds that TOML has not: text stands for a path, a list for a tuple.
+PathText = Annotated[Path, Field(strict=False)]
+PathTexts = Annotated[tuple[PathText, ...], Field(strict=False)]
 
 
 class TomlFile(_Section):
     """A file of the user's own, kept with its text: a recording replays without the file."""
 
-    path: Path
+    path: PathText
     text: str
 
 
@@ -79,7 +84,7 @@ def _checked(load: Callable[[str | TomlFile], object]) -> AfterValidator:
 Source = Annotated[str | TomlFile, BeforeValidator(_kept)]
 DefinitionsSource = Annotated[Source, _checked(definitions_of)]
 ProfileSource = Annotated[Source, _checked(profile_of)]
-ChannelNumber = Annotated[int, Field(ge=0, le=255)]  # one byte of a packet
+ChannelNumber = Annotated[int, Field(ge=0, le=255, strict=False)]  # one byte of a packet; keys of tables are text
 
 
 def _octal(label: str) -> str:
@@ -120,13 +125,22 @@ FlagName = Literal["parity", "coding", "word_length", "sync"]  # as RackLink has
 Mask = Annotated[int, Field(ge=0, le=0xFFFF_FFFF)]
 
 
+def _whole(size: object) -> object:
+    if isinstance(size, bool | float):  # a Literal takes whatever equals a choice of its, as true does 1
+        raise ValueError("write 1, 8 or 16")  # noqa: TRY004 # which pydantic would not tell
+    return size
+
+
+SizeBits = Annotated[Literal[1, 8, 16], BeforeValidator(_whole)]
+
+
 class VendorConfig(_Section):
     """What a file of an interface card leaves open; where nothing is said, the layout's usual value is taken."""
 
     tick_ns: int | None = Field(None, ge=1, le=1_000_000_000, description="of the card's clock")
     flags_429: dict[FlagName, Mask] | None = Field(None, description="the card's bits that mean it, by our flag")
     flags_708: dict[FlagName, Mask] | None = Field(None, description="the same of radar words")
-    size_bits: Literal[1, 8, 16] | None = Field(None, description="what MXF's dataSize counts: bits, bytes or words")
+    size_bits: SizeBits | None = Field(None, description="what MXF's dataSize counts: bits, bytes or words")
     words_per_s: float | None = Field(None, ge=1, le=1e6, description="of an RDR-4B's file, which has no times")
 
 
@@ -163,7 +177,7 @@ class AdapterConfig(_Section):
 class RecordingConfig(_Section):
     """Where recordings go, and how much a power cut may cost."""
 
-    directory: Path = Path("recordings")
+    directory: PathText = Path("recordings")
     sync_interval_s: float = Field(1.0, gt=0, le=60)
     rotate_mib: float = Field(1024, ge=0, le=1 << 20, description="a new file from this size on; 0 for one of any size")
     rotate_minutes: float = Field(60, ge=0, le=10_000, description="a new file after so long; 0 for one of any length")
@@ -174,14 +188,14 @@ class RecordingConfig(_Section):
 class RackConfig(_Section):
     """Everything `shadebus run` needs."""
 
-    adapters: tuple[AdapterConfig, ...]
+    adapters: Annotated[tuple[AdapterConfig, ...], Field(strict=False)]
     recording: RecordingConfig | None = None
-    terrain: tuple[Path, ...] = Field((), description="GeoTIFF, HGT or DTED files")
-    water: tuple[Path, ...] = Field(
+    terrain: PathTexts = Field((), description="GeoTIFF, HGT or DTED files")
+    water: PathTexts = Field(
         (),
         description="rasters, where every value but 0 is water, or GeoJSON polygons: over large water nothing counts",
     )
-    calibration: Path | None = Field(None, description="calibration file of the radar; stated defaults without")
+    calibration: PathText | None = Field(None, description="calibration file of the radar; stated defaults without")
     radar_profile: ProfileSource = Field("arinc708", description="ARINC 708 profile of radar channels that name none")
     monitor: MonitorSettings = MonitorSettings()
     wait_for_devices: bool = Field(False, description="start although a device is not there yet, and keep trying")
@@ -241,10 +255,18 @@ def check_config(table: dict[str, object], origin: str, base: Path = Path()) -> 
         raise GatewayError(f"{origin}: {problems}") from error
 
 
+# In words for whoever wrote the file, where pydantic has Python's.
+SAID = {
+    "extra_forbidden": "there is no such option: see docs/options.md for [monitor], examples/rack.toml for the rest",
+    "tuple_type": "write a list, in brackets",
+    "path_type": "write a path, in quotes",
+    "model_type": "write a table of options",
+    "dict_type": "write a table",
+}
+
+
 def _said(problem: ErrorDetails) -> str:
-    """What is wrong with a value, in words for whoever wrote it."""
-    if problem["type"] == "extra_forbidden":
-        return "there is no such option: see docs/options.md for [monitor], examples/rack.toml for the rest"
+    """What is wrong with a value."""
     if isinstance(problem["input"], float) and math.isnan(problem["input"]):
         return "it is no number"
-    return problem["msg"].removeprefix("Value error, ")
+    return SAID.get(problem["type"], problem["msg"].removeprefix("Value error, "))

@@ -39,6 +39,86 @@ def test_paths_count_from_where_the_rack_file_lies(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("option", "wanted"),
+    [
+        ('baud = "9600"', "baud: Input should be a valid integer"),
+        ("baud = 9600.0", "baud: Input should be a valid integer"),
+        ("baud = true", "baud: Input should be a valid integer"),
+        ("name = 7", "name: Input should be a valid string"),
+        ("source = 7", "source: Input should be a valid string"),
+        ("framing = 7", "framing: Input should be 'racklink', "),
+        ("vendor = 7", "vendor: write a table of options"),
+        ('vendor = { tick_ns = "40" }', "vendor.tick_ns: Input should be a valid integer"),
+        ('vendor = { size_bits = "8" }', "vendor.size_bits: Input should be 1, 8 or 16"),
+        ("vendor = { size_bits = 8.0 }", "vendor.size_bits: write 1, 8 or 16"),
+        ("vendor = { size_bits = true }", "vendor.size_bits: write 1, 8 or 16"),
+        ('vendor = { words_per_s = "180" }', "vendor.words_per_s: Input should be a valid number"),
+        ('vendor = { flags_429 = { parity = "1" } }', "vendor.flags_429.parity: Input should be a valid integer"),
+        ("vendor = { flags_708 = 1 }", "vendor.flags_708: write a table"),
+        ("channels = 7", "channels: write a table"),
+        ('channels = { x = { kind = "arinc429" } }', r"channels.x.\[key\]: Input should be a valid integer"),
+        ('channels = { 1 = { kind = "arinc429", sdi = "1" } }', "channels.1.sdi: Input should be a valid integer"),
+        ('channels = { 1 = { kind = "arinc429", sdi = true } }', "channels.1.sdi: Input should be a valid integer"),
+        (
+            'channels = { 1 = { kind = "arinc429", delays_ms = { 110 = "3" } } }',
+            "channels.1.delays_ms.110: Input should be a valid number",
+        ),
+    ],
+)
+def test_a_value_of_another_kind_in_an_adapter_is_refused_with_what_it_takes(
+    tmp_path: Path, option: str, wanted: str
+) -> None:
+    key = option.partition(" ")[0]
+    lines = [line for line in ADAPTER.splitlines() if not line.startswith(f"{key} =")]
+    with pytest.raises(GatewayError, match=rf"rack\.toml: adapters\.0\.{wanted}"):
+        load(tmp_path, "\n".join([*lines, option]))
+
+
+@pytest.mark.parametrize(
+    ("option", "wanted"),
+    [
+        ('terrain = "a.hgt"', "terrain: write a list, in brackets"),
+        ("terrain = [7]", "terrain.0: write a path, in quotes"),
+        ("water = [true]", "water.0: write a path, in quotes"),
+        ("calibration = 7", "calibration: write a path, in quotes"),
+        ("wait_for_devices = 1", "wait_for_devices: Input should be a valid boolean"),
+        ('wait_for_devices = "true"', "wait_for_devices: Input should be a valid boolean"),
+        ("recording = true", "recording: write a table of options"),
+        ('recording = { sync_interval_s = "1" }', "recording.sync_interval_s: Input should be a valid number"),
+        ("recording = { rotate_minutes = true }", "recording.rotate_minutes: Input should be a valid number"),
+        ("recording = { rotate_mib = 2026-05-28 }", "recording.rotate_mib: Input should be a valid number"),
+        ('recording = { reserve_mib = "256" }', "recording.reserve_mib: Input should be a valid number"),
+        ("recording = { queue_mib = 64.0 }", "recording.queue_mib: Input should be a valid integer"),
+        ("recording = { directory = 7 }", "recording.directory: write a path, in quotes"),
+        ('monitor = { lever_arm = "none" }', "monitor.lever_arm: write a table of options"),
+    ],
+)
+def test_a_value_of_another_kind_is_refused_with_what_it_takes(tmp_path: Path, option: str, wanted: str) -> None:
+    with pytest.raises(GatewayError, match=rf"rack\.toml: {wanted}$"):
+        load(tmp_path, f"{option}\n{ADAPTER}")
+
+
+def test_integers_are_numbers_and_keys_of_tables_are_channels(tmp_path: Path) -> None:
+    text = f"""recording = {{ sync_interval_s = 2, rotate_mib = 0, directory = "d" }}
+monitor = {{ beam_width_deg = 4 }}
+{ADAPTER}
+vendor = {{ words_per_s = 180, size_bits = 8, flags_708 = {{ sync = 0x10 }} }}
+[adapters.channels.17]
+kind = "arinc429"
+delays_ms = {{ 110 = 3 }}
+"""
+    config = load(tmp_path, text)
+    assert config.recording is not None
+    assert (config.recording.sync_interval_s, config.monitor.beam_width_deg) == (2.0, 4.0)
+    (adapter,) = config.adapters
+    assert adapter.vendor.model_dump(exclude_none=True) == {
+        "words_per_s": 180.0, "size_bits": 8, "flags_708": {"sync": 16},
+    }  # fmt: skip
+    assert adapter.channels[17].delays_ms == {"110": 3.0}
+    assert recorded_config(describe(config, None)) == config
+
+
+@pytest.mark.parametrize(
     ("text", "where"),
     [
         ("", "adapters: Field required"),
