@@ -88,7 +88,7 @@ class Limits(BaseModel):
 
 
 class Calibration(BaseModel):
-    """The file that the monitor loads; bins are range bins of the radar it was measured with.
+    """The file that the monitor loads, and the radar it was measured with; bins are range bins.
 
     `height_m` are limits of the antenna's mean height above the ground below it; `options` the monitor's options that
     shape disparities, as `MonitorSettings.shaping` gives them, none in files that do not say.
@@ -98,9 +98,9 @@ class Calibration(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     name: str = Field(min_length=1)
     provenance: str
-    bins: int | None = Field(None, ge=1)
-    range_nm: float | None = Field(None, gt=0)
-    radar_profile: str | None = None
+    bins: int = Field(ge=1)
+    range_nm: float = Field(gt=0)
+    radar_profile: str
     median_bins: float = Field(ge=-MOST_BINS, le=MOST_BINS)
     spread_bins: float = Field(gt=0, le=MOST_BINS)
     sigma_bins: float = Field(gt=0)
@@ -129,14 +129,14 @@ class Calibration(BaseModel):
 
     def mismatch(self, bins: int, range_nm: float, profile: str, settings: MonitorSettings) -> str | None:
         """Why the calibration does not hold for a scan and a monitor, or None. Of a profile "" nothing is known."""
-        if self.bins not in (None, bins):
+        if self.bins != bins:
             return f"calibration {self.name} is for {self.bins} range bins, the radar sends {bins}: {MEND}"
-        if self.range_nm not in (None, range_nm):
+        if self.range_nm != range_nm:
             return (
                 f"calibration {self.name} is for a range of {self.range_nm:g} NM, the radar is set to {range_nm:g} NM: "
                 f"{MEND}"
             )
-        if profile and self.radar_profile not in (None, profile):
+        if profile and self.radar_profile != profile:
             return f"calibration {self.name} is for radar profile {self.radar_profile}, this one is {profile}: {MEND}"
         for name, ours in settings.shaping.items():
             theirs = self.options.get(name, ours)
@@ -147,27 +147,26 @@ class Calibration(BaseModel):
 
 MEND = "load one that was made for it, or none"
 
-_DEFAULTS = Calibration(
-    name=NO_CALIBRATION,
-    provenance="stated defaults: spread and sigma of a beam-averaged radar over mountains, not measured for this radar",
-    bins=512,
-    median_bins=0.0,
-    spread_bins=2.2,
-    sigma_bins=2.6,
-    rms_bins=7.0,
-    variance_factor=1.5,
-)
-
 
 @cache
-def uncalibrated(bins: int) -> Calibration:
-    """Stated defaults for a radar of so many bins that nobody has calibrated.
+def uncalibrated(bins: int, range_nm: float, radar_profile: str) -> Calibration:
+    """Stated defaults for a radar that nobody has calibrated: of a beam-averaged one over mountains.
 
     The errors behind a disparity are angles, so they are a share of the range setting: coarser bins count fewer.
     """
     scale = bins / 512
-    scaled = {name: getattr(_DEFAULTS, name) * scale for name in ("spread_bins", "sigma_bins", "rms_bins")}
-    return _DEFAULTS.model_copy(update={"bins": bins, **scaled})
+    return Calibration(
+        name=NO_CALIBRATION,
+        provenance="stated defaults, not measured for this radar",
+        bins=bins,
+        range_nm=range_nm,
+        radar_profile=radar_profile,
+        median_bins=0.0,
+        spread_bins=2.2 * scale,
+        sigma_bins=2.6 * scale,
+        rms_bins=7.0 * scale,
+        variance_factor=1.5,
+    )
 
 
 def load_calibration(path: Path) -> Calibration:

@@ -146,11 +146,9 @@ def _holds(model: UnmatchedModel | None, settings: MonitorSettings) -> bool:
 
 def untested(settings: MonitorSettings, calibration: Calibration) -> list[str]:
     """What a calibration does not allow to be tested although the settings would have it, and why."""
-    name, found = calibration.name, []
-    if unsaid := [what for what in ("bins", "range_nm", "radar_profile") if getattr(calibration, what) is None]:
-        found.append(f"calibration {name} does not say for which {', '.join(unsaid)} it holds: it is taken for any")
     if settings.method == "paper":
-        return found
+        return []
+    name, found = calibration.name, []
     if calibration.shift is None and settings.shift_budget:
         found.append(f"shifts are not tested: calibration {name} does not say how shadows lie, make it anew")
     model = calibration.unmatched_dem

@@ -32,9 +32,9 @@ def fit(
     *,
     name: str,
     provenance: str,
-    bins: int | None = None,
-    range_nm: float | None = None,
-    radar_profile: str | None = None,
+    bins: int,
+    range_nm: float,
+    radar_profile: str,
 ) -> Calibration:
     """Fit to fault-free scans, and count on other scans how often each P_FA would have alerted.
 

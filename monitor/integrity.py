@@ -100,7 +100,7 @@ class Monitor:
             self._tracker.add(int(scan.time_ns[-1]), fronts)
         verdict, of_itself = self._decide(scan, comparison, doubts, reasons)
         if of_itself and self.settings.offset_search_m:
-            calibration = self.calibration or uncalibrated(scan.bins.shape[1])
+            calibration = self._calibration(scan)
             search = Search(scan, chosen, pointing, here, self.settings, calibration, screens)
             if found := search.most_likely():
                 verdict = replace(
@@ -129,6 +129,9 @@ class Monitor:
         """How far from the radials in use the terrain of a scan may be looked at, moved about and on all radials."""
         return scan.range_nm * NM_M + math.sqrt(2) * (self.settings.offset_search_m + sum(FINE_M)) + FLOWN_M
 
+    def _calibration(self, scan: Scan) -> Calibration:
+        return self.calibration or uncalibrated(scan.bins.shape[1], scan.range_nm, scan.profile)
+
     def _screens(
         self, scan: Scan, pointing: Pointing, height_over_ground_m: NDArray[np.float64], water: Water | None
     ) -> tuple[Screens, list[str]]:
@@ -150,7 +153,7 @@ class Monitor:
         """The verdict, and whether it is an alert that this scan gives by itself."""
         bins = scan.bins.shape[1]
         now_ns, setting = int(scan.time_ns[-1]), (scan.range_nm, bins)
-        calibration = self.calibration or uncalibrated(bins)
+        calibration = self._calibration(scan)
         sample = comparison.sample(scan)
         pairs, scans = sample.disparities, 1
         unlike = self._unlike_calibration(sample)

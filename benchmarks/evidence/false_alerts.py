@@ -36,7 +36,17 @@ def calibrated(flown: Sequence[Flown], name: str) -> Calibration:
     """A calibration from flights: every second one fits, the others check."""
     fitting, checking = scans_of(flown[::2]), scans_of(flown[1::2])
     settings = MonitorSettings(minimum_pairs=MINIMUM_PAIRS)
-    return fit(fitting, checking, P_FAS, settings, name=name, provenance="evidence", bins=512, range_nm=10.0)
+    return fit(
+        fitting,
+        checking,
+        P_FAS,
+        settings,
+        name=name,
+        provenance="evidence",
+        bins=512,
+        range_nm=10.0,
+        radar_profile="arinc708",
+    )
 
 
 def tests(calibration: Calibration, pool: Sequence[ScanSample]) -> dict[str, Alerts]:

@@ -34,7 +34,7 @@ class Changing:
         heights.astype(">i2").tofile(self.directory / "N44W072.hgt")
 
     def calibrate(self, name: str) -> None:
-        made = uncalibrated(512).model_copy(update={"name": name})
+        made = uncalibrated(512, 10.0, "arinc708").model_copy(update={"name": name})
         (self.directory / "radar.json").write_text(made.model_dump_json())
 
     def outcome(self) -> tuple[set[str], bool, str]:

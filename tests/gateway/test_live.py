@@ -44,7 +44,7 @@ def test_a_flight_through_a_pseudo_terminal_is_recorded_whole_and_judged(
 def test_a_calibration_for_another_radar_makes_every_verdict_unavailable_and_is_named(
     stream: bytes, make_rack: MakeRack, tmp_path: Path
 ) -> None:
-    other = uncalibrated(256).model_copy(update={"name": "another radar"})
+    other = uncalibrated(256, 10.0, "arinc708").model_copy(update={"name": "another radar"})
     (tmp_path / "calibration.json").write_text(other.model_dump_json())
     with PtyOutlet() as line:
         rack = make_rack(f"serial:{line.path}", terrain=[TERRAIN], calibration=tmp_path / "calibration.json")

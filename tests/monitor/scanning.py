@@ -33,6 +33,7 @@ CALIBRATED = Calibration(
     provenance="made up",
     bins=512,
     range_nm=10.0,
+    radar_profile="arinc708",
     median_bins=0.0,
     spread_bins=2.0,
     sigma_bins=2.5,

@@ -19,6 +19,9 @@ DEFAULTS = MonitorSettings()
 STORED = Calibration(
     name="bench",
     provenance="made up",
+    bins=512,
+    range_nm=10.0,
+    radar_profile="arinc708",
     median_bins=0.0,
     spread_bins=2.0,
     sigma_bins=2.2,
@@ -27,8 +30,6 @@ STORED = Calibration(
 )
 WHOLE = STORED.model_copy(
     update={
-        "bins": 512,
-        "range_nm": 10.0,
         "unmatched_radar": UnmatchedModel(mean=0.4, overdispersion=0.01),
         "unmatched_dem": UnmatchedModel(mean=0.2, overdispersion=0.0),
         "level": Limits(lowest=1.5, highest=2.5),
@@ -66,8 +67,13 @@ def damaged(tmp_path: Path, old: str, new: str) -> Path:
         ('"variance_factor":1.4', '"variance_factor":1e9', "variance_factor"),
         ('"spread_bins":2.0', '"spread_bins":1e6', "spread_bins"),
         ('"sigma_bins":2.2', '"sigma_bins":4.1', "the file: Value error, sigma_bins 4.1 is above 2 spread_bins"),
-        ('"bins":null', '"bins":0', "bins"),
-        ('"range_nm":null', '"range_nm":-1', "range_nm"),
+        ('"bins":512', '"bins":0', "bins"),
+        ('"bins":512', '"bins":null', "bins: Input should be a valid integer; .*anew with shadebus calibrate radar"),
+        ('"bins":512,', "", "bins: Field required; .*anew with shadebus calibrate radar"),
+        ('"range_nm":10.0', '"range_nm":-1', "range_nm"),
+        ('"range_nm":10.0', '"range_nm":null', "range_nm: Input should be a valid number; .*calibrate radar"),
+        ('"radar_profile":"arinc708"', '"radar_profile":null', "radar_profile: Input should be a valid string; .*anew"),
+        ('"radar_profile":"arinc708",', "", "radar_profile: Field required; .*anew with shadebus calibrate radar"),
         ('"level":null', '"level":{"lowest":3,"highest":1}', "level: Value error, lowest 3 is above highest 1"),
         ('"name":"bench"', '"name":""', "name"),
         ('"name":"bench"', '"name":"none"', "its name is 'none', as if there were none"),
@@ -95,10 +101,8 @@ def test_a_calibration_says_for_which_radar_it_holds() -> None:
     assert made.mismatch(512, 10.0, "arinc708", DEFAULTS) is None
     assert "calibration bench is for 512 range bins, the radar sends 256" in str(made.mismatch(256, 10.0, "", DEFAULTS))
     assert "range of 10 NM, the radar is set to 20 NM" in str(made.mismatch(512, 20.0, "", DEFAULTS))
-    profiled = made.model_copy(update={"radar_profile": "arinc708"})
-    assert profiled.mismatch(512, 10.0, "arinc708", DEFAULTS) is None
-    assert profiled.mismatch(512, 10.0, "", DEFAULTS) is None
-    said = str(profiled.mismatch(512, 10.0, "rdr4000", DEFAULTS))
+    assert made.mismatch(512, 10.0, "", DEFAULTS) is None
+    said = str(made.mismatch(512, 10.0, "rdr4000", DEFAULTS))
     assert "is for radar profile arinc708, this one is rdr4000: load one that was made for it" in said
 
 
@@ -112,7 +116,7 @@ def test_a_calibration_made_with_other_options_does_not_hold() -> None:
 
 
 def test_the_stated_defaults_are_the_same_share_of_the_range_setting_for_any_number_of_bins() -> None:
-    fine, coarse = uncalibrated(512), uncalibrated(256)
+    fine, coarse = (uncalibrated(bins, 20.0, "arinc708") for bins in (512, 256))
     assert coarse.mismatch(256, 20.0, "", DEFAULTS) is None
     for name in ("spread_bins", "sigma_bins", "rms_bins", "clip_bins"):
         assert getattr(fine, name) == 2 * getattr(coarse, name)

@@ -130,11 +130,6 @@ def test_a_calibration_without_what_a_test_needs_leaves_its_share_to_q_and_says_
     assert not untested(settings.model_copy(update={"method": "paper"}), old)
 
 
-def test_a_calibration_that_does_not_say_for_which_radar_it_holds_is_named() -> None:
-    (said,) = untested(MonitorSettings(), CALIBRATION.model_copy(update={"bins": None, "range_nm": None}))
-    assert said == "calibration made does not say for which bins, range_nm it holds: it is taken for any"
-
-
 def test_where_neither_q_nor_the_shift_statistic_could_alert_nothing_is_ok() -> None:
     """Common errors of the position as large as these hide any shift, and 20 clipped pairs Q at such a P_FA."""
     exact, wide = (

@@ -19,6 +19,9 @@ NONE = Unmatched(0, 0)
 SETTINGS = MonitorSettings(minimum_pairs=16)
 
 
+RADAR: Any = {"bins": 512, "range_nm": 10.0, "radar_profile": "arinc708"}
+
+
 def normal_scans(scans: int, n: int = 50, common: float = 0.0) -> Scans:
     """Independent normal disparities, and an error that all disparities of a scan have in common."""
     rng = np.random.default_rng(RNG_SEED)
@@ -31,7 +34,7 @@ def fitted(scans: Scans, check: Scans | None = None, p_fas: tuple[float, ...] = 
         [ScanSample(d, d, np.zeros(len(d)), np.ones(len(d)), NONE, NONE, np.nan) for d in some]
         for some in (scans, check or [])
     )
-    return fit(fitting, checking, p_fas, SETTINGS, name="made", provenance="drawn", bins=512, range_nm=10.0)
+    return fit(fitting, checking, p_fas, SETTINGS, name="made", provenance="drawn", **RADAR)
 
 
 def test_normal_disparities_give_back_their_parameters() -> None:
@@ -121,7 +124,7 @@ def fitted_to_shares(counts: Any, eligible: int, levels: NDArray[np.float64]) ->
         ScanSample(d, d, np.zeros(len(d)), np.ones(len(d)), Unmatched(int(count), eligible), NONE, level)
         for d, count, level in zip(normal_scans(len(counts)), counts, levels, strict=True)
     ]
-    return fit(scans, [], (), SETTINGS, name="made", provenance="drawn")
+    return fit(scans, [], (), SETTINGS, name="made", provenance="drawn", **RADAR)
 
 
 def test_shares_of_a_beta_binomial_give_back_its_mean_and_overdispersion() -> None:

@@ -50,7 +50,7 @@ def search(terrain: Terrain, seen: Scan, screens: Screens = NO_SCREENS) -> Searc
     one = np.ones(RADIALS)
     pointing = Pointing(LATITUDE * one, LONGITUDE * one, 400.0 * one, 0 * one, 0 * one)
     settings = MonitorSettings(beam_width_deg=20, azimuth_fan=1, offset_search_m=400)
-    return Search(seen, np.arange(RADIALS), pointing, terrain, settings, uncalibrated(BINS), screens)
+    return Search(seen, np.arange(RADIALS), pointing, terrain, settings, uncalibrated(BINS, seen.range_nm, ""), screens)
 
 
 def test_where_no_shadows_pair_anywhere_no_error_is_named() -> None:

@@ -21,7 +21,7 @@ SECTOR = slice(10, 29)  # radials that have some pairs, and too few for a verdic
 LEVEL = 3.0  # of the honest scan, where it is lit
 LEVELS = Limits(lowest=LEVEL - 0.5, highest=LEVEL + 0.5)
 # The clip is so wide that as many pairs as are needed can alert.
-OF_ANY_RANGE = CALIBRATED.model_copy(update={"range_nm": None, "level": LEVELS, "spread_bins": 3.0})
+WIDE = CALIBRATED.model_copy(update={"level": LEVELS, "spread_bins": 3.0})
 TOGETHER = "pairs of the last 2 scans together"
 Seen = tuple[Scan, Aircraft]
 
@@ -36,7 +36,7 @@ def part(scan: Scan) -> Scan:
     )
 
 
-def monitor_of(terrain: Terrain, calibration: Calibration = OF_ANY_RANGE, **settings: int) -> Monitor:
+def monitor_of(terrain: Terrain, calibration: Calibration | None = WIDE, **settings: int) -> Monitor:
     return Monitor(terrain, MonitorSettings.model_validate({"offset_search_m": 0, **settings}), calibration)
 
 
@@ -48,9 +48,9 @@ def judged(monitor: Monitor, *seen: Seen, since: int = 0) -> list[Verdict]:
     ]
 
 
-def alone(terrain: Terrain, *seen: Seen) -> list[Verdict]:
+def alone(terrain: Terrain, *seen: Seen, calibration: Calibration | None = WIDE) -> list[Verdict]:
     """The verdicts of a monitor for each scan, of which none has another one before."""
-    return [judged(monitor_of(terrain, window_scans=WINDOW), one)[0] for one in seen]
+    return [judged(monitor_of(terrain, calibration, window_scans=WINDOW), one)[0] for one in seen]
 
 
 def underground(terrain: Terrain, honest: Scan) -> Seen:
@@ -82,14 +82,18 @@ def test_scans_with_too_few_pairs_lend_them_to_the_next(white_mountains: Terrain
     assert second.reasons == (TOGETHER,)
 
 
-@pytest.mark.parametrize("between", [underground, too_dim, at_another_range])
+@pytest.mark.parametrize(("between", "calibration"), [(underground, WIDE), (too_dim, WIDE), (at_another_range, None)])
 def test_a_scan_that_does_not_belong_there_neither_lends_pairs_nor_borrows_any(
-    white_mountains: Terrain, honest: Scan, between: Callable[[Terrain, Scan], Seen]
+    white_mountains: Terrain,
+    honest: Scan,
+    between: Callable[[Terrain, Scan], Seen],
+    calibration: Calibration | None,
 ) -> None:
     """Its own pairs with those of the scan before, or of the one behind it, would be enough."""
     good, other = (part(honest), flying()), between(white_mountains, honest)
-    *first, last = judged(monitor_of(white_mountains, window_scans=WINDOW), good, other, good, good)
-    assert first == alone(white_mountains, good, other, good)
+    monitor = monitor_of(white_mountains, calibration, window_scans=WINDOW)
+    *first, last = judged(monitor, good, other, good, good)
+    assert first == alone(white_mountains, good, other, good, calibration=calibration)
     assert {verdict.scans for verdict in first} == {1}
     assert first[0].n_pairs + first[1].n_pairs >= NEEDED > max(verdict.n_pairs for verdict in first)
     assert (last.verdict, last.scans, last.n_pairs) == ("ok", 2, 2 * first[0].n_pairs)
