@@ -70,7 +70,8 @@ def beside(meridian_deg: float, longitude_deg: ArrayLike) -> NDArray[np.float64]
     What is no longitude, as NaN or 1e300, does not become one: no longitude needs more than two turns.
     """
     given = np.asarray(longitude_deg, float)
-    return given + TURN_DEG * np.clip(np.round((meridian_deg - given) / TURN_DEG), -2, 2)
+    turns = np.rint((meridian_deg - given) / TURN_DEG)
+    return np.asarray(given + TURN_DEG * np.minimum(np.maximum(turns, -2), 2))
 
 
 class Terrain:
