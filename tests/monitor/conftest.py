@@ -1,12 +1,14 @@
 """Settings and real terrain for the monitor's tests."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+from monitor import terrain
 from monitor.scans import Scan
-from monitor.terrain import Terrain, open_terrain
+from monitor.terrain import Terrain, WideTerrain, open_terrain
 from tests.monitor.scanning import honest_scan
 
 # The first example of a run may compile a kernel, so a time limit on an example would measure the compiler.
@@ -14,6 +16,7 @@ settings.register_profile("compiled", deadline=None)
 settings.load_profile("compiled")
 
 ROOT = Path(__file__).parents[2]
+Opened = Callable[[Path | list[Path]], Terrain]
 
 
 @pytest.fixture(scope="session")
@@ -45,3 +48,18 @@ def sierra(sierra_path: Path) -> Terrain:
 def honest(white_mountains: Terrain) -> Scan:
     """A scan that agrees with the terrain to the bin."""
     return honest_scan(white_mountains)
+
+
+@pytest.fixture(params=["whole", "wide"])
+def opened(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Opened:
+    """Opens files as terrain that is held, or as if they were too large to be."""
+    if request.param == "wide":
+        monkeypatch.setattr(terrain, "WHOLE_POSTS", 0)
+        monkeypatch.setattr(terrain, "BLOCK_DEG", 0.125)
+
+    def checked(paths: Path | list[Path]) -> Terrain:
+        found = open_terrain(paths)
+        assert isinstance(found, WideTerrain) == (request.param == "wide")
+        return found
+
+    return checked

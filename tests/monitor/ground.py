@@ -50,3 +50,8 @@ def mesa(first_m: float, last_m: float, top_m: float) -> Grid:
 def looking_north(height_m: float, tilt_deg: float = 0.0) -> Pointing:
     one = np.ones(1)
     return Pointing(LATITUDE * one, LONGITUDE * one, height_m * one, 0 * one, np.radians(tilt_deg) * one)
+
+
+def either_side(longitude_deg: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Longitudes as receivers have them, as files beyond the date line have them, and the other way round."""
+    return [(longitude_deg + 180) % 360 - 180, longitude_deg % 360, longitude_deg % 360 - 360]
