@@ -18,6 +18,7 @@ from monitor.terrain_files import TerrainError
 from monitor.water import open_water
 
 COPY = "look for another copy, or update shadebus if a later version wrote it"
+ANEW = f"judge it anew by a rack file with another one (shadebus reprocess -c), {COPY}"
 
 
 def build_monitor(config: RackConfig, calibration: Calibration | None = None) -> Monitor | None:
@@ -89,7 +90,7 @@ def recorded_monitor(
     try:
         calibration = Calibration.model_validate_json(metadata["calibration"]) if metadata["calibration"] else None
     except (KeyError, ValidationError) as error:
-        raise GatewayError(f"the recording holds no calibration that this version understands: {COPY}") from error
+        raise GatewayError(f"the recording holds no calibration that this version understands: {ANEW}") from error
     config = config.with_maps(terrain, water)
     monitor = build_monitor(config, calibration)
     if monitor and not terrain and monitor.terrain.checksum != metadata["terrain_checksum"]:

@@ -114,6 +114,14 @@ class Calibration(BaseModel):
     options: dict[str, str] = {}
     checked: tuple[CheckedRate, ...] = ()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _of_older_versions(cls, given: object) -> object:
+        """Their `common` errors are of disparities whose edges were not clipped: without a `shift` S is not tested."""
+        if not isinstance(given, dict):
+            return given
+        return {name: value for name, value in given.items() if name != "common"}
+
     @model_validator(mode="after")
     def _some_disparity_stands_out(self) -> Self:
         if self.sigma_bins > self.clip_bins:  # of what is clipped

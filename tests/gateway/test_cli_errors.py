@@ -110,7 +110,7 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
     ),
     "odd calibration": (
         lambda d: ["replay", without_calibration(d)],
-        ("the recording holds no calibration", "look for another copy, or update"),
+        ("the recording holds no calibration", "shadebus reprocess -c", "look for another copy, or update"),
     ),
     "missing calibration": (
         lambda d: source("--dem", TERRAIN, "--calibration", d / "no.json"),

@@ -7,7 +7,9 @@ import pytest
 from monitor.calibration import (
     Calibration,
     CheckedRate,
+    EdgeModel,
     Limits,
+    ShiftModel,
     UnmatchedModel,
     load_calibration,
     uncalibrated,
@@ -28,8 +30,16 @@ STORED = Calibration(
     rms_bins=6.0,
     variance_factor=1.4,
 )
+SHIFT = ShiftModel(
+    front=EdgeModel(median_bins=0.5, clip_bins=3.0),
+    back=EdgeModel(median_bins=-0.5, clip_bins=4.0),
+    sigma_bins=1.5,
+    place_bins=0.25,
+    stretch=0.01,
+)
 WHOLE = STORED.model_copy(
     update={
+        "shift": SHIFT,
         "unmatched_radar": UnmatchedModel(mean=0.4, overdispersion=0.01),
         "unmatched_dem": UnmatchedModel(mean=0.2, overdispersion=0.0),
         "level": Limits(lowest=1.5, highest=2.5),
@@ -48,8 +58,13 @@ def test_a_file_from_before_there_were_shares_and_levels_loads() -> None:
     assert (STORED.unmatched_radar, STORED.unmatched_dem, STORED.level) == (None, None, None)
 
 
-def damaged(tmp_path: Path, old: str, new: str) -> Path:
-    text = STORED.model_dump_json()
+def test_a_file_with_the_common_errors_of_older_versions_loads_without_a_test_for_shifts(tmp_path: Path) -> None:
+    common = '"common":{"place_bins":0.2,"stretch":0.004}'
+    assert load_calibration(damaged(tmp_path, '"shift":null', common)) == STORED
+
+
+def damaged(tmp_path: Path, old: str, new: str, calibration: Calibration = STORED) -> Path:
+    text = calibration.model_dump_json()
     assert old in text
     path = tmp_path / "radar.json"
     path.write_text(text.replace(old, new))
@@ -87,9 +102,17 @@ def test_a_fault_in_the_file_names_the_file_and_the_field(tmp_path: Path, old: s
         load_calibration(damaged(tmp_path, old, new))
 
 
+def test_no_pair_could_stand_out_of_more_scatter_than_clipped_edges_have(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"radar\.json: shift: Value error, sigma_bins 3.6 is above 3.5, where"):
+        load_calibration(damaged(tmp_path, '"sigma_bins":1.5', '"sigma_bins":3.6', WHOLE))
+
+
 def test_a_file_that_is_missing_or_no_json_is_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"lost\.json cannot be read: No such file"):
         load_calibration(tmp_path / "lost.json")
+    (tmp_path / "torn.json").write_bytes(b"5")
+    with pytest.raises(ValueError, match=r"torn\.json: the file: Input should be"):
+        load_calibration(tmp_path / "torn.json")
     for content in (b"{", b"\xff\xfe\x00"):
         (tmp_path / "torn.json").write_bytes(content)
         with pytest.raises(ValueError, match=r"torn\.json: the file: Invalid JSON"):
