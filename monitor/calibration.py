@@ -13,40 +13,42 @@ NO_CALIBRATION = "none"
 MOST_BINS = 256  # half of the usual radar's: nothing that pairs is farther apart when nothing is wrong
 
 
-class CheckedRate(BaseModel):
+class _Section(BaseModel):
+    # A NaN or an infinite sigma would make Q pass every threshold; a number in quotes is a slip of the hand.
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+
+class CheckedRate(_Section):
     """What a configured P_FA came to, with all tests, on scans that the fit had not seen."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
     p_fa: float = Field(gt=0, lt=1)
     scans: int = Field(ge=0)
     alerts: int = Field(ge=0)
 
 
-class UnmatchedModel(BaseModel):
+class UnmatchedModel(_Section):
     """How large a share of one thread's eligible shadows has no partner when nothing is wrong.
 
     Of shadows of `least_size` range bins and more. `overdispersion` is rho of the variance m (1 - m) (1 / n + rho): 0
     for shadows that stand or fall each by itself.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     mean: float = Field(gt=0, lt=1)
     overdispersion: float = Field(ge=0, le=1)
     least_size: int = Field(3, ge=1)  # of the files that do not say
 
 
-class EdgeModel(BaseModel):
+class EdgeModel(_Section):
     """How far edges of the radar's shadows lie from the terrain's when nothing is wrong, range bins.
 
     Their median, and the largest deviation from it that counts in full.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     median_bins: float = Field(ge=-MOST_BINS, le=MOST_BINS)
     clip_bins: float = Field(gt=0, le=MOST_BINS)
 
 
-class ShiftModel(BaseModel):
+class ShiftModel(_Section):
     """How disparities lie over the azimuths when nothing is wrong.
 
     Both edges, the scatter `sigma_bins` of the disparities of clipped edges, and two errors that the pairs of a scan
@@ -55,7 +57,6 @@ class ShiftModel(BaseModel):
     shadows seen from higher up are shorter.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     front: EdgeModel
     back: EdgeModel
     sigma_bins: float = Field(gt=0)
@@ -69,10 +70,9 @@ class ShiftModel(BaseModel):
         return self
 
 
-class Limits(BaseModel):
+class Limits(_Section):
     """Between which values the fault-free scans lay, of their signal levels or of their heights."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     lowest: float
     highest: float
 
@@ -87,15 +87,13 @@ class Limits(BaseModel):
         return self.lowest <= value <= self.highest
 
 
-class Calibration(BaseModel):
+class Calibration(_Section):
     """The file that the monitor loads, and the radar it was measured with; bins are range bins.
 
     `height_m` are limits of the antenna's mean height above the ground below it; `options` the monitor's options that
     shape disparities, as `MonitorSettings.shaping` gives them, none in files that do not say.
     """
 
-    # A NaN or an infinite sigma would make Q pass every threshold.
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     name: str = Field(min_length=1)
     provenance: str
     bins: int = Field(ge=1)
@@ -112,7 +110,7 @@ class Calibration(BaseModel):
     level: Limits | None = None
     height_m: Limits | None = None
     options: dict[str, str] = {}
-    checked: tuple[CheckedRate, ...] = ()
+    checked: tuple[CheckedRate, ...] = Field((), strict=False)  # which JSON has as a list
 
     @model_validator(mode="before")
     @classmethod

@@ -76,6 +76,8 @@ def damaged(tmp_path: Path, old: str, new: str, calibration: Calibration = STORE
     [
         ('"spread_bins":2.0', '"spread_bins":-2.0', "spread_bins"),
         ('"sigma_bins":2.2', '"sigma_bins":"wide"', "sigma_bins"),
+        ('"sigma_bins":2.2', '"sigma_bins":"2.2"', "sigma_bins"),
+        ('"bins":512', '"bins":true', "bins"),
         ('"sigma_bins":2.2', '"sigma_bins":Infinity', "sigma_bins"),
         ('"median_bins":0.0', '"median_bins":NaN', "median_bins"),
         ('"variance_factor":1.4', '"variance_factor":0.9', "variance_factor"),
