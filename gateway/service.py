@@ -42,11 +42,16 @@ class Service:
         self._journal = Journal(self._keeper, self._to_core.deliver, limit_bytes)
         self._core = core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, self._core_failed)
 
+        self._warm = threading.Event()  # set when the core has its kernels, for which a first start compiles
+
         def core_work() -> None:
-            if monitor:  # the journal records meanwhile
-                warm_up_gateway(monitor)
-            else:
-                warm_up_words()
+            try:
+                if monitor:  # the journal records meanwhile
+                    warm_up_gateway(monitor)
+                else:
+                    warm_up_words()
+            finally:
+                self._warm.set()
             self._to_core.run(core)
 
         self._supervisors = [
@@ -58,7 +63,6 @@ class Service:
 
     def start(self) -> None:
         """Start every thread. Raises GatewayError if a device cannot be opened and the configuration does not wait."""
-        self._core_thread.start()
         self._journal_thread.start()
         for thread in self._adapter_threads:
             thread.start()
@@ -68,6 +72,7 @@ class Service:
                 self.stop()
                 self._forget_an_empty_recording()
                 raise GatewayError("; ".join(errors))
+        self._core_thread.start()
 
     @property
     def recording_path(self) -> Path | None:
@@ -105,18 +110,24 @@ class Service:
                 self.failures.append(f"{thread.name}: its driver does not come back; it is left behind")
         self._journal.queue.close()
         self._journal_thread.join()
-        self._to_core.queue.close()
-        self._core_thread.join(LAST_WORDS_S)
-        if self._core_thread.is_alive():
-            self.failures.append(
-                f"core: still not done {LAST_WORDS_S:.0f} s after the end; whoever reads our output stands still"
-            )
+        self._end_core()
         if self._to_core.skipped:
             self.failures.append(f"core: {self._to_core.skipped} records skipped at the end; replay the recording")
         if self._keeper and self._keeper.failure:
             self.failures.append(f"recording stopped: {self._keeper.failure}")
         if self._keeper and self._keeper.lost:
             self.failures.append(f"recording: {self._keeper.lost} records were not recorded")
+
+    def _end_core(self) -> None:
+        self._to_core.queue.close()
+        if self._core_thread.ident is None:  # never started: a device could not be opened
+            return
+        self._warm.wait()  # the time that a first start compiles is not that of its last words
+        self._core_thread.join(LAST_WORDS_S)
+        if self._core_thread.is_alive():
+            self.failures.append(
+                f"core: still not done {LAST_WORDS_S:.0f} s after the end; whoever reads our output stands still"
+            )
 
     def _keeper_of(self, config: RackConfig, monitor: Monitor | None) -> Keeper | None:
         if config.recording is None:

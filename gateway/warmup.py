@@ -22,13 +22,17 @@ NORMAL = 3  # SSM
 LATER_NS = 2_000_000_000  # so that the bus has a second that is over
 
 
+def compiled() -> bool:
+    """Whether an earlier start has kept kernels. The first start on a machine compiles them for half a minute."""
+    return any(Path(str(follow.stats.cache_path)).glob("timebase.follow-*.nbi"))
+
+
 def warm_up_gateway(monitor: Monitor) -> None:
     """Load all that bytes need on their way to a verdict; what must be compiled first, on two cores.
 
     Numba compiles on one core of a process, so a process of its own does it for the words.
     """
-    kept = Path(str(follow.stats.cache_path)).glob("timebase.follow-*.nbi")
-    compiler = None if any(kept) else _compiler()
+    compiler = None if compiled() else _compiler()
     warm_up(monitor)
     if compiler:
         compiler.wait()
