@@ -10,6 +10,7 @@ from monitor.settings import MonitorSettings
 
 CLIP_FACTOR = 2.0
 NO_CALIBRATION = "none"
+LEAST_BINS = 0.001  # of a spread: edges are whole bins, so no radar is as exact
 MOST_BINS = 256  # half of the usual radar's: nothing that pairs is farther apart when nothing is wrong
 
 
@@ -45,7 +46,7 @@ class EdgeModel(_Section):
     """
 
     median_bins: float = Field(ge=-MOST_BINS, le=MOST_BINS)
-    clip_bins: float = Field(gt=0, le=MOST_BINS)
+    clip_bins: float = Field(ge=LEAST_BINS, le=MOST_BINS)
 
 
 class ShiftModel(_Section):
@@ -59,7 +60,7 @@ class ShiftModel(_Section):
 
     front: EdgeModel
     back: EdgeModel
-    sigma_bins: float = Field(gt=0)
+    sigma_bins: float = Field(ge=LEAST_BINS, le=MOST_BINS)
     place_bins: float = Field(ge=0, le=MOST_BINS)
     stretch: float = Field(ge=0, le=10)
 
@@ -94,15 +95,15 @@ class Calibration(_Section):
     shape disparities, as `MonitorSettings.shaping` gives them, none in files that do not say.
     """
 
-    name: str = Field(min_length=1)
+    name: str = Field(min_length=1, pattern=r"^\P{C}+$")  # it stands in the line of every verdict
     provenance: str
     bins: int = Field(ge=1)
     range_nm: float = Field(gt=0)
     radar_profile: str
     median_bins: float = Field(ge=-MOST_BINS, le=MOST_BINS)
-    spread_bins: float = Field(gt=0, le=MOST_BINS)
-    sigma_bins: float = Field(gt=0)
-    rms_bins: float = Field(gt=0)
+    spread_bins: float = Field(ge=LEAST_BINS, le=MOST_BINS)
+    sigma_bins: float = Field(ge=LEAST_BINS, le=MOST_BINS)
+    rms_bins: float = Field(ge=LEAST_BINS, le=MOST_BINS)
     variance_factor: float = Field(ge=1, le=1000)
     shift: ShiftModel | None = None
     unmatched_radar: UnmatchedModel | None = None

@@ -145,10 +145,15 @@ def _holds(model: UnmatchedModel | None, settings: MonitorSettings) -> bool:
 
 
 def untested(settings: MonitorSettings, calibration: Calibration) -> list[str]:
-    """What a calibration does not allow to be tested although the settings would have it, and why."""
-    if settings.method == "paper":
-        return []
+    """What a calibration does not allow to be tested or compared although the settings would have it, and why."""
     name, found = calibration.name, []
+    limits = {"signal levels": calibration.level, "heights above the ground": calibration.height_m}
+    unsaid = [what for what, limit in limits.items() if limit is None]
+    unsaid += sorted(settings.shaping.keys() - calibration.options.keys())
+    if unsaid:
+        found.append(f"calibration {name} does not say for which {', '.join(unsaid)} it holds: make it anew")
+    if settings.method == "paper":
+        return found
     if calibration.shift is None and settings.shift_budget:
         found.append(f"shifts are not tested: calibration {name} does not say how shadows lie, make it anew")
     model = calibration.unmatched_dem

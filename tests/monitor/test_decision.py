@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import betabinom, binom, chi2
 
-from monitor.calibration import Calibration, EdgeModel, ShiftModel, UnmatchedModel
+from monitor.calibration import Calibration, EdgeModel, Limits, ShiftModel, UnmatchedModel
 from monitor.decision import DEM_SHARE, RADAR_SHARE, examine, pairs_for_verdict, unmatched_threshold, untested
 from monitor.sample import ScanSample, Unmatched
 from monitor.settings import MonitorSettings
@@ -26,6 +26,9 @@ CALIBRATION = Calibration(
     shift=SHIFT,
     unmatched_radar=MODEL,
     unmatched_dem=MODEL,
+    level=Limits(lowest=1.0, highest=3.0),
+    height_m=Limits(lowest=100.0, highest=900.0),
+    options=MonitorSettings().shaping,
 )
 BARE = CALIBRATION.model_copy(update={"shift": None, "unmatched_radar": None, "unmatched_dem": None})
 FEW, MANY = Unmatched(10, 50), Unmatched(45, 50)
@@ -128,6 +131,14 @@ def test_a_calibration_without_what_a_test_needs_leaves_its_share_to_q_and_says_
     assert "of 8 bins and more are not tested: calibration made has those of 3 bins and more" in unmatched
     assert not untested(settings, CALIBRATION)
     assert not untested(settings.model_copy(update={"method": "paper"}), old)
+
+
+@pytest.mark.parametrize("method", ["robust", "paper"])
+def test_what_a_calibration_does_not_say_it_holds_for_is_named(method: str) -> None:
+    options = {name: value for name, value in CALIBRATION.options.items() if name != "beam_width_deg"}
+    unsaid = CALIBRATION.model_copy(update={"level": None, "options": {**options, "beam_with_deg": "3.5"}})
+    (told,) = untested(MonitorSettings.model_validate({"method": method}), unsaid)
+    assert told == "calibration made does not say for which signal levels, beam_width_deg it holds: make it anew"
 
 
 def test_where_neither_q_nor_the_shift_statistic_could_alert_nothing_is_ok() -> None:
