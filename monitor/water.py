@@ -18,10 +18,11 @@ import numpy as np
 import rasterio
 from numba import njit
 from numpy.typing import NDArray
+from rasterio._err import CPLE_BaseError  # what GDAL says where rasterio has no error of its own for it
 from rasterio.crs import CRS
 from rasterio.enums import Resampling
 from rasterio.errors import CRSError, RasterioError
-from rasterio.features import bounds, rasterize
+from rasterio.features import rasterize
 from rasterio.transform import Affine
 from rasterio.vrt import WarpedVRT
 from rasterio.warp import transform_bounds, transform_geom
@@ -109,7 +110,7 @@ def open_water(path_or_paths: Path | Sequence[Path], terrain: Terrain, minimum_k
 def _told(path: Path) -> Iterator[None]:
     try:
         yield
-    except (RasterioError, OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (RasterioError, CPLE_BaseError, OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         mend = "name a raster of one band or GeoJSON polygons"
         raise WaterError(f"water file {path} cannot be read as a raster or GeoJSON: {error}: {mend}") from error
 
@@ -148,12 +149,13 @@ def _polygons(path: Path, extent: Extent) -> Draw:
     if not all(_is_whole(shape) for shape in found):
         raise WaterError(f"water file {path} holds a polygon without closed rings of numbers: mend or remove it")
     shapes = found if crs == WGS84 else [part for shape in found for part in _areas(transform_geom(crs, WGS84, shape))]
-    west, south, east, north = zip(*(bounds(shape) for shape in shapes), strict=True)
-    turns_deg = _turns_deg(path, (min(west), min(south), max(east), max(north)), extent)
+    polygons = [_unwrapped(path, rings) for shape in shapes for rings in _parts(shape)]
+    positions = np.concatenate([outer for outer, *_ in polygons])
+    turns_deg = _turns_deg(path, (*positions.min(axis=0).tolist(), *positions.max(axis=0).tolist()), extent)
     shapes = [
-        {"type": shape["type"], "coordinates": _turned(shape["coordinates"], turn_deg)}
+        {"type": "Polygon", "coordinates": [np.add(ring, (turn_deg, 0)).tolist() for ring in rings]}
         for turn_deg in turns_deg
-        for shape in shapes
+        for rings in polygons
     ]
 
     def draw(grid: Grid) -> NDArray[np.bool_]:
@@ -185,11 +187,15 @@ def _areas(item: Any) -> Iterator[dict[str, Any]]:
             yield from _areas(part)
 
 
+def _parts(shape: dict[str, Any]) -> Any:
+    """The polygons of a Polygon or MultiPolygon, each a list of rings."""
+    return shape["coordinates"] if shape["type"] == "MultiPolygon" else [shape["coordinates"]]
+
+
 def _is_whole(shape: dict[str, Any]) -> bool:
     """Whether every ring is four positions of finite numbers or more: GDAL takes the rest on trust, and may crash."""
     try:
-        parts = shape["coordinates"] if shape["type"] == "MultiPolygon" else [shape["coordinates"]]
-        polygons = [[np.asarray(ring) for ring in part] for part in parts]
+        polygons = [[np.asarray(ring) for ring in part] for part in _parts(shape)]
     except (KeyError, TypeError, ValueError):
         return False
     rings = [ring for polygon in polygons for ring in polygon]
@@ -205,11 +211,26 @@ def _transform(grid: Grid) -> Affine:
     return Affine(grid.column_deg, 0, west_deg, 0, -grid.row_deg, north_deg)
 
 
-def _turned(coordinates: Any, turn_deg: float) -> Any:
-    """The coordinates of a GeoJSON geometry, turned about the Earth; rings that end on the date line go on there."""
-    if isinstance(coordinates[0], int | float):
-        return [coordinates[0] + turn_deg, *coordinates[1:]]
-    return [_turned(part, turn_deg) for part in coordinates]
+def _unwrapped(path: Path, rings: Any) -> list[NDArray[np.float64]]:
+    """Rings (n, 2) of a polygon without breaks in longitude, the holes beside the outer one."""
+    outer, *holes = [_without_breaks(path, np.asarray(ring, float)[:, :2]) for ring in rings]
+    for hole in holes:
+        hole[:, 0] += TURN_DEG * np.round((_middle_deg(outer) - _middle_deg(hole)) / TURN_DEG)
+    return [outer, *holes]
+
+
+def _without_breaks(path: Path, ring: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The ring with the shorter way from each position to the next; a whole turn goes along a parallel, as written."""
+    steps_deg = np.diff(ring[:, 0], append=ring[0, 0])
+    turns = np.where(np.abs(steps_deg) == TURN_DEG, 0, np.round(steps_deg / TURN_DEG))
+    if turns.sum():
+        raise WaterError(f"water file {path} holds a ring around a pole: cut it at the date line (RFC 7946, 3.1.9)")
+    ring[1:, 0] -= TURN_DEG * np.cumsum(turns[:-1])
+    return ring
+
+
+def _middle_deg(ring: NDArray[np.float64]) -> float:
+    return float(ring[:, 0].min() + ring[:, 0].max()) / 2
 
 
 def _turns_deg(path: Path, box: tuple[float, float, float, float], extent: Extent) -> list[float]:

@@ -23,7 +23,7 @@ from monitor.shade import DEM_SHADOW
 from monitor.terrain import Terrain, open_terrain
 from monitor.verdict import Verdict
 from monitor.warmup import warm_up
-from monitor.water import WaterFiles, open_water
+from monitor.water import WaterError, WaterFiles, open_water
 from tests.monitor.conftest import Opened
 from tests.monitor.ground import either_side
 from tests.monitor.scanning import CALIBRATED, MS, flying, honest_scan, moved
@@ -244,6 +244,50 @@ def test_a_polygon_or_a_raster_that_nobody_cut_is_water_on_both_sides(
         drawn.append(wet(open_water(path, stored, 1.0), stored, meridian))
     np.testing.assert_array_equal(drawn[1], drawn[0])
     assert drawn[0].any()
+
+
+def unlike_its_neighbour(shape: dict[str, Any]) -> dict[str, Any]:
+    """Longitudes between -180 and 180, so that rings jump where they cross the line."""
+    rings = [[[(x + 180) % 360 - 180, y] for x, y in ring] for ring in shape["coordinates"]]
+    return {"type": "Polygon", "coordinates": rings}
+
+
+@pytest.mark.parametrize("crs", [None, "EPSG:2193", "EPSG:3413", "EPSG:3995", "EPSG:3571"])
+def test_a_polygon_that_jumps_from_179_to_minus_179_is_water_on_both_sides(
+    files: dict[int, list[Path]], tmp_path: Path, crs: str | None
+) -> None:
+    """With an island east of the line, one west of it and one across; GDAL's own transformation leaves such jumps."""
+    drawn = []
+    for meridian in (INLAND, LINE):
+        lake = square(meridian - 0.101, -16.601, meridian + 0.151, -16.451)
+        for west, east in ((0.05, 0.07), (-0.09, -0.07), (-0.02, 0.03)):
+            lake["coordinates"] += square(meridian + west, -16.549, meridian + east, -16.521)["coordinates"]
+        document = unlike_its_neighbour(lake)
+        if crs and meridian == LINE:
+            to_metres = Transformer.from_crs("EPSG:4326", crs, always_xy=True)
+            document["coordinates"] = [[to_metres.transform(*at) for at in ring] for ring in lake["coordinates"]]
+            document["crs"] = {"type": "name", "properties": {"name": crs}}
+        path, stored = written(tmp_path / f"{meridian}.geojson", document), open_terrain(files[meridian])
+        drawn.append(wet(open_water(path, stored, 1.0), stored, meridian))
+    np.testing.assert_array_equal(drawn[1], drawn[0])
+    assert 1000 < np.count_nonzero(drawn[0]) < drawn[0].size / 2
+
+
+def test_a_sea_that_goes_once_round_the_earth_along_parallels_is_water_everywhere(
+    files: dict[int, list[Path]], tmp_path: Path
+) -> None:
+    for west, south, north in ((-180, -90, 90), (-180, -20, -10), (0, -20, -10)):
+        path = written(tmp_path / "sea.geojson", square(west, south, west + 360, north))
+        for meridian in (INLAND, LINE):
+            stored = open_terrain(files[meridian])
+            assert wet(open_water(path, stored, 1.0), stored, meridian).all()
+
+
+def test_a_ring_around_a_pole_is_refused_with_the_mend(files: dict[int, list[Path]], tmp_path: Path) -> None:
+    ring = [[longitude, -10] for longitude in (0, 90, 179, -90, 0)]
+    path = written(tmp_path / "sea.geojson", {"type": "Polygon", "coordinates": [ring]})
+    with pytest.raises(WaterError, match=r"sea\.geojson holds a ring around a pole: cut it at the date line"):
+        open_water(path, open_terrain(files[LINE]), 1.0)
 
 
 def test_projected_water_across_the_line_is_drawn_on_both_sides(files: dict[int, list[Path]], tmp_path: Path) -> None:

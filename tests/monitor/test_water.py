@@ -92,6 +92,13 @@ def test_polygons_in_another_reference_system_are_transformed(tmp_path: Path) ->
         open_water(written(tmp_path / "w.geojson", document), TERRAIN, 0.0)
 
 
+def test_a_polygon_that_lies_nowhere_in_its_reference_system_is_refused_by_name(tmp_path: Path) -> None:
+    crs = {"type": "name", "properties": {"name": "EPSG:2193"}}
+    path = written(tmp_path / "w.geojson", {**square(-1e30, -1e30, 1e30, 1e30), "crs": crs})
+    with pytest.raises(WaterError, match=r"w\.geojson cannot be read as a raster or GeoJSON: .*projection"):
+        open_water(path, TERRAIN, 0.0)
+
+
 def test_every_value_but_0_and_nodata_of_a_raster_is_water(tmp_path: Path) -> None:
     values = np.zeros((20, 30), np.uint8)
     values[3, 5:7], values[4, 5:7], values[9, 9] = 1, 200, 255
