@@ -12,6 +12,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from shlex import quote
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,8 @@ TURN_DEG = 360.0
 FINEST_DEG = 1e-9  # between posts: a tenth of a millimetre
 ALIGNMENT_POSTS = 0.05  # files whose posts miss a common grid by more are refused: resampling is not ours to hide
 POSTS_AT_ONCE = 40_000_000  # of a file: what is read is a few times as large as what becomes of it
+METRES = {"", "m", "metre", "metres", "meter", "meters"}  # a band without a unit is in metres
+FOOT_M = 0.3048  # the survey foot's too, to 2 cm in 9 km
 SAMPLE_BYTES, SAMPLE_EVERY = 4096, 1 << 20
 BEYOND_RING_DEG = 5.0  # at 70 degrees of latitude the longest range spans less
 
@@ -151,12 +154,14 @@ def _opened(path: Path) -> Iterator[rasterio.DatasetReader]:
             raise TerrainError(f"terrain file {path} does not exist: check the path in the configuration or --dem")
         path.open("rb").close()
         with rasterio.open(path) as source:
+            _check_unit(path, source)
             if source.crs is None:
                 raise TerrainError(f"{path} has no coordinate reference system: assign one with gdal_edit.py -a_srs")
             if source.crs == WGS84:
                 yield source
                 return
             west, _, east, _ = transform_bounds(source.crs, WGS84, *source.bounds)
+            _check_surface(path, source.crs)
             crs = WGS84 if west <= east else WGS84_EASTWARD  # GDAL's word for a file on both sides of the date line
             # The warped raster has corners that the source does not reach: NaN, or they would read as 0 m.
             warp = {"crs": crs, "resampling": Resampling.bilinear, "nodata": math.nan, "dtype": "float32"}
@@ -170,6 +175,28 @@ def _opened(path: Path) -> Iterator[rasterio.DatasetReader]:
     except (RasterioError, OSError) as error:
         mend = "get it anew, whole, or convert it with gdal_translate"
         raise TerrainError(f"{path} cannot be read as terrain (GeoTIFF, HGT or DTED): {error}: {mend}") from error
+
+
+def _check_unit(path: Path, source: rasterio.DatasetReader) -> None:
+    """GDAL's unit of the band, or that of the vertical axis of a compound reference system where a band has none."""
+    unit, scale, offset = source.units[0] or "", source.scales[0], source.offsets[0]
+    if unit.strip().lower() in METRES:
+        return
+    mend = "convert its heights"
+    if any(name in unit.lower() for name in ("ft", "foot", "feet")):
+        at_0_m, at_1_m = offset * FOOT_M, (offset + scale) * FOOT_M
+        scale = f"-scale 0 1 {at_0_m:.9g} {at_1_m:.9g} -a_scale 1 -a_offset 0"
+        mend = (
+            f"gdal_translate -ot Float32 {scale} {quote(str(path))} metres.tif, then gdal_edit.py -units m metres.tif"
+        )
+    raise TerrainError(f"{path} has heights in {unit!r}, and metres are needed: {mend}")
+
+
+def _check_surface(path: Path, crs: CRS) -> None:
+    """A reference system with a third axis of its own has heights above the ellipsoid there."""
+    if len(crs.to_dict(projjson=True).get("coordinate_system", {}).get("axis", ())) > 2:
+        mend = "gdalwarp -t_srs EPSG:4326+5773 makes them, if PROJ has the geoid's grid us_nga_egm96_15.tif"
+        raise TerrainError(f"{path} has heights above the ellipsoid, and those above mean sea level are needed: {mend}")
 
 
 def _header(path: Path) -> Sheet:
@@ -194,6 +221,9 @@ def _sheet(source: rasterio.DatasetReader) -> Sheet:
 
 def _heights_m(source: rasterio.DatasetReader, window: Window) -> NDArray[np.float32]:
     height_m = np.asarray(source.read(1, window=window, masked=True).astype(np.float32).filled(np.nan))
+    scale, offset = source.scales[0], source.offsets[0]  # which read does not apply, nor does a warp
+    if (scale, offset) != (1, 0):
+        height_m = height_m * np.float32(scale) + np.float32(offset)
     if np.any((height_m < LOWEST_M) | (height_m > HIGHEST_M)):
         extremes = f"{np.nanmin(height_m):.0f} to {np.nanmax(height_m):.0f}"
         raise TerrainError(f"{source.name} holds heights of {extremes} m: mark voids as nodata, convert to metres")

@@ -1,6 +1,7 @@
 """The terrain store against rasterio, the standards' post positions and exact bilinear arithmetic."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +23,17 @@ def write(
     transform: Affine,
     crs: str | None = "EPSG:4326",
     nodata: float | None = None,
+    band: dict[str, object] | None = None,
 ) -> Path:
+    """A GeoTIFF; `band` gives rasterio's `scales`, `offsets` or `units` of its only one."""
     rows, columns = height_m.shape
     with rasterio.open(
         path, "w", driver="GTiff", height=rows, width=columns, count=1, dtype=height_m.dtype, crs=crs,
         transform=transform, nodata=nodata,
     ) as file:  # fmt: skip
         file.write(height_m, 1)
+        for name, value in (band or {}).items():
+            setattr(file, name, (value,))
     return path
 
 
@@ -209,6 +214,62 @@ def test_heights_that_no_ground_has_are_refused_with_the_mend(tmp_path: Path, he
     path = write(tmp_path / "noise.tif", np.array(heights, np.int16), north_up(7, 45, 0.25))
     with pytest.raises(TerrainError, match=r"noise.tif holds heights of .* m: mark voids as nodata"):
         open_terrain(path)
+
+
+@pytest.mark.parametrize("unit", ["", "m", "Metre", "METER"])
+def test_heights_are_what_a_file_s_scale_and_offset_make_of_its_numbers(tmp_path: Path, unit: str) -> None:
+    """0.1 x 9000 + 50 is 950 m, and the number of voids is none of a height."""
+    numbers = np.array([[9000, 10_000], [-30, -32_768]], np.int16)
+    band: dict[str, object] = {"scales": 0.1, "offsets": 50.0, "units": unit}
+    path = write(tmp_path / "scaled.tif", numbers, north_up(7, 45, 0.25), nodata=-32_768, band=band)
+    np.testing.assert_allclose(open_terrain(path).grid.height_m, np.array([[950, 1050], [47, np.nan]]), rtol=1e-6)
+
+
+def test_scale_and_offset_hold_for_a_projected_file_too(tmp_path: Path) -> None:
+    numbers = np.full((40, 40), 9000, np.int16)
+    band: dict[str, object] = {"scales": 0.1, "offsets": 50.0}
+    path = write(tmp_path / "utm.tif", numbers, north_up(EAST, NORTH, SPACING), crs="EPSG:32619", band=band)
+    height_m = open_terrain(path).grid.height_m
+    np.testing.assert_allclose(height_m[np.isfinite(height_m)], 950, rtol=1e-6)
+    assert np.isfinite(height_m).sum() > 1000
+
+
+@pytest.mark.parametrize(
+    ("crs", "band", "unit", "scale"),
+    [
+        ("EPSG:4326", {"units": "ft"}, "ft", "0 0.3048"),
+        ("EPSG:4326", {"units": "Feet", "scales": 0.1, "offsets": 50.0}, "Feet", "15.24 15.27048"),
+        ("EPSG:4326+6360", {}, "US survey foot", "0 0.3048"),
+        ("EPSG:32619+6360", {}, "US survey foot", "0 0.3048"),
+    ],
+)
+def test_feet_are_refused_with_the_command_that_makes_them_metres(
+    tmp_path: Path, crs: str, band: dict[str, object], unit: str, scale: str
+) -> None:
+    """50 ft are 15.24 m, and 50.1 ft 15.27048; GDAL takes the unit of a compound system's vertical axis too."""
+    path = write(tmp_path / "feet.tif", np.ones((4, 4), np.int16), north_up(7, 45, 0.25), crs=crs, band=band)
+    mend = f"gdal_translate -ot Float32 -scale 0 1 {scale} -a_scale 1 -a_offset 0 {path} metres.tif, then gdal_edit.py"
+    with pytest.raises(TerrainError, match=re.escape(f"{path} has heights in '{unit}', and metres are needed: {mend}")):
+        open_terrain(path)
+
+
+def test_a_unit_that_nobody_knows_is_refused_by_name(tmp_path: Path) -> None:
+    path = write(tmp_path / "far.tif", np.ones((3, 3), np.int16), north_up(7, 45, 0.25), band={"units": "km"})
+    with pytest.raises(TerrainError, match=r"far\.tif has heights in 'km', and metres are needed: convert its heights"):
+        open_terrain(path)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4979", "+proj=utm +zone=19 +datum=WGS84 +vunits=m"])
+def test_heights_above_the_ellipsoid_are_refused_with_the_mend(tmp_path: Path, crs: str) -> None:
+    path = write(tmp_path / "high.tif", np.ones((3, 3), np.int16), north_up(7, 45, 0.25), crs=crs)
+    with pytest.raises(TerrainError, match=r"high\.tif has heights above the ellipsoid, .*: gdalwarp -t_srs EPSG:4326"):
+        open_terrain(path)
+
+
+@pytest.mark.parametrize("geoid", [5773, 3855])
+def test_metres_above_a_geoid_that_the_reference_system_names_are_taken(tmp_path: Path, geoid: int) -> None:
+    path = write(tmp_path / "egm.tif", np.full((3, 3), 7, np.int16), north_up(7, 45, 0.25), crs=f"EPSG:4326+{geoid}")
+    assert open_terrain(path).elevation(44.5, 7.4) == 7
 
 
 def test_a_picture_is_no_terrain(tmp_path: Path) -> None:
