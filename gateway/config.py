@@ -33,8 +33,15 @@ class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
+def _from_home(path: Path) -> Path:
+    try:
+        return path.expanduser()
+    except RuntimeError as error:
+        raise ValueError(f"{path} begins in a home that there is not: write the whole path") from error
+
+
 # Kinds that TOML has not: text stands for a path, a list for a tuple.
-PathText = Annotated[Path, Field(strict=False)]
+PathText = Annotated[Path, Field(strict=False), AfterValidator(_from_home)]
 PathTexts = Annotated[tuple[PathText, ...], Field(strict=False)]
 
 
@@ -51,7 +58,7 @@ def _kept(name: object, info: ValidationInfo) -> object:
         raise ValueError("write a name, or the path of a .toml file")  # noqa: TRY004 # which pydantic would not tell
     if not isinstance(name, str) or not name.endswith(".toml"):
         return name
-    path = (info.context or {}).get("base", Path()) / name
+    path = (info.context or {}).get("base", Path()) / _from_home(Path(name))
     try:
         return TomlFile(path=path, text=path.read_text("utf-8"))
     except OSError as error:
@@ -84,7 +91,18 @@ def _checked(load: Callable[[str | TomlFile], object]) -> AfterValidator:
 Source = Annotated[str | TomlFile, BeforeValidator(_kept)]
 DefinitionsSource = Annotated[Source, _checked(definitions_of)]
 ProfileSource = Annotated[Source, _checked(profile_of)]
-ChannelNumber = Annotated[int, Field(ge=0, le=255, strict=False)]  # one byte of a packet; keys of tables are text
+
+
+def _number(key: object) -> object:
+    """Keys of tables are text; of several texts that may mean a number only one is taken, or two tables were one."""
+    if isinstance(key, str):
+        if not re.fullmatch("0|[1-9][0-9]{0,2}", key):
+            raise ValueError(f"{key!r} is no channel: write plain digits, 0 to 255")
+        return int(key)
+    return key
+
+
+ChannelNumber = Annotated[int, Field(ge=0, le=255), BeforeValidator(_number)]  # one byte of a packet
 
 
 def _octal(label: str) -> str:
@@ -113,6 +131,12 @@ class ChannelConfig(_Section):
     delays_ms: dict[OctalLabel, Delay] = Field(
         default_factory=dict, description="by octal label, how long after it was true a value is sent"
     )
+
+
+IDLE = {  # by kind, the options that nothing asks for
+    "arinc429": {"profile"},
+    "arinc708": {"definitions", "orientation", "join_rule", "sdi", "delays_ms"},
+}
 
 
 def _not_ours(name: str) -> str:
@@ -188,7 +212,7 @@ class RecordingConfig(_Section):
 class RackConfig(_Section):
     """Everything `shadebus run` needs."""
 
-    adapters: Annotated[tuple[AdapterConfig, ...], Field(strict=False)]
+    adapters: Annotated[tuple[AdapterConfig, ...], Field(strict=False)] = ()
     recording: RecordingConfig | None = None
     terrain: PathTexts = Field((), description="GeoTIFF, HGT or DTED files")
     water: PathTexts = Field(
@@ -228,6 +252,7 @@ def load_config(path: Path) -> RackConfig:
         raise GatewayError(f"configuration {path} is not TOML: {error}") from error
     base = path.absolute().parent
     config = check_config(table, str(path), base)
+    _check_idle(config, path)
     recording = config.recording and config.recording.model_copy(
         update={"directory": base / config.recording.directory}
     )
@@ -238,6 +263,18 @@ def load_config(path: Path) -> RackConfig:
         "recording": recording,
     }
     return config.model_copy(update=changes)
+
+
+def _check_idle(config: RackConfig, path: Path) -> None:
+    """Here and not in the model, since recordings of older versions may hold such options."""
+    idle = [
+        f"adapters.{k}.channels.{number}.{name}: {channel.kind} has no use for it: leave it out"
+        for k, adapter in enumerate(config.adapters)
+        for number, channel in adapter.channels.items()
+        for name in sorted(channel.model_fields_set & IDLE[channel.kind])
+    ]
+    if idle:
+        raise GatewayError(f"{path}: {'; '.join(idle)}")
 
 
 def check_config(table: dict[str, object], origin: str, base: Path = Path()) -> RackConfig:

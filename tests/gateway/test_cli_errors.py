@@ -138,7 +138,7 @@ CASES: dict[str, tuple[Callable[[Path], Arguments], tuple[str, ...]]] = {
         ("serial line socket://127.0.0.1:99999: write", "from 1 to 65535"),
     ),
     "channel too high": (lambda d: rack(d, RACK + CHANNEL.format(999)), ("channels.999", "less than or equal to 255")),
-    "channel below 0": (lambda d: rack(d, RACK + CHANNEL.format(-1)), ("channels.-1", "greater than or equal to 0")),
+    "channel below 0": (lambda d: rack(d, RACK + CHANNEL.format(-1)), ("channels.-1", "write plain digits, 0 to 255")),
     "scrap of a recording": (lambda d: ["info", scrap(d)], ("scrap.mcap is not", "it ends before its first record")),
     "start past the end": (
         lambda d: ["replay", "--start", "5", a_second(d)],

@@ -1,5 +1,6 @@
 """A rack file is checked as a whole before anything opens, and errors say where and what."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,27 @@ def test_paths_count_from_where_the_rack_file_lies(tmp_path: Path) -> None:
     assert config.recording.directory == tmp_path / "d"
 
 
+def test_a_path_may_begin_in_the_user_s_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    (home / "radar.toml").write_text(OWN_PROFILE)
+    maps = 'terrain = ["~/a.hgt"]\nwater = ["~/w.tif"]\ncalibration = "~/c.json"\nradar_profile = "~/radar.toml"\n'
+    config = load(tmp_path, f'{maps}{ADAPTER}[recording]\ndirectory = "~/d"\n')
+    assert (*config.terrain, *config.water) == (home / "a.hgt", home / "w.tif")
+    assert config.calibration == home / "c.json"
+    assert config.radar_profile == TomlFile(path=home / "radar.toml", text=OWN_PROFILE)
+    assert config.recording is not None
+    assert config.recording.directory == home / "d"
+    for option, where in (
+        ('terrain = ["~nobody-here/a"]', r"terrain\.0"),
+        ('radar_profile = "~nobody-here/a.toml"', ""),
+    ):
+        said = f"{where}.*: ~nobody-here/a.* begins in a home that there is not: write the whole path"
+        with pytest.raises(GatewayError, match=said):
+            load(tmp_path, f"{option}\n{ADAPTER}")
+
+
 @pytest.mark.parametrize(
     ("option", "wanted"),
     [
@@ -56,7 +78,7 @@ def test_paths_count_from_where_the_rack_file_lies(tmp_path: Path) -> None:
         ('vendor = { flags_429 = { parity = "1" } }', "vendor.flags_429.parity: Input should be a valid integer"),
         ("vendor = { flags_708 = 1 }", "vendor.flags_708: write a table"),
         ("channels = 7", "channels: write a table"),
-        ('channels = { x = { kind = "arinc429" } }', r"channels.x.\[key\]: Input should be a valid integer"),
+        ('channels = { x = { kind = "arinc429" } }', r"channels.x.\[key\]: 'x' is no channel: write plain digits"),
         ('channels = { 1 = { kind = "arinc429", sdi = "1" } }', "channels.1.sdi: Input should be a valid integer"),
         ('channels = { 1 = { kind = "arinc429", sdi = true } }', "channels.1.sdi: Input should be a valid integer"),
         (
@@ -121,8 +143,8 @@ delays_ms = {{ 110 = 3 }}
 @pytest.mark.parametrize(
     ("text", "where"),
     [
-        ("", "adapters: Field required"),
-        ("adapters = []", "adapters: name at least one"),
+        ("", r"adapters: name at least one, as \[\[adapters\]\]"),
+        ("adapters = []", r"adapters: name at least one, as \[\[adapters\]\]"),
         (ADAPTER + "speed = 9600", "adapters.0.speed: there is no such option"),
         (ADAPTER + "baud = 10", "adapters.0.baud: .*300"),
         (ADAPTER.replace("serial:", "serial"), "adapters.0.source"),
@@ -154,6 +176,50 @@ def test_a_mistake_is_named_with_file_and_key(tmp_path: Path, text: str, where: 
         load(tmp_path, text)
     assert str(tmp_path / "rack.toml") in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "key", ["01", '"1.0"', '" 1"', '"+1"', "1_0", "-1", "00", '"\u0661"', '""', "1000", '"1e1"', "0x1"]
+)
+def test_a_channel_is_one_text_of_plain_digits_and_no_other_that_may_mean_it(tmp_path: Path, key: str) -> None:
+    """Two texts of one number would be two tables, of which the second took the place of the first."""
+    text = f'{ADAPTER}[adapters.channels.1]\nkind = "arinc708"\n[adapters.channels.{key}]\nkind = "arinc429"\n'
+    said = rf"channels\..*\[key\]: {re.escape(repr(key.strip(chr(34))))} is no channel: write plain digits, 0 to 255$"
+    with pytest.raises(GatewayError, match=said):
+        load(tmp_path, text)
+
+
+def test_channels_from_0_to_255_are_taken(tmp_path: Path) -> None:
+    tables = "".join(f'[adapters.channels.{n}]\nkind = "arinc708"\n' for n in range(256))
+    assert list(load(tmp_path, ADAPTER + tables).adapters[0].channels) == list(range(256))
+    with pytest.raises(GatewayError, match=r"channels\.256\.\[key\]: .*less than or equal to 255"):
+        load(tmp_path, ADAPTER + '[adapters.channels.256]\nkind = "arinc708"')
+
+
+@pytest.mark.parametrize(
+    ("kind", "option"),
+    [
+        ("arinc708", 'definitions = "iru_704"'),
+        ("arinc708", 'orientation = "wire"'),
+        ("arinc708", 'join_rule = "toward_zero"'),
+        ("arinc708", "sdi = 1"),
+        ("arinc708", "delays_ms = { 324 = 20 }"),
+        ("arinc429", 'profile = "arinc708"'),
+    ],
+)
+def test_an_option_that_does_nothing_for_a_channel_s_kind_is_refused_by_name(
+    tmp_path: Path, kind: str, option: str
+) -> None:
+    name = option.partition(" ")[0]
+    said = rf"rack\.toml: adapters\.0\.channels\.7\.{name}: {kind} has no use for it: leave it out$"
+    with pytest.raises(GatewayError, match=said):
+        load(tmp_path, f'{ADAPTER}[adapters.channels.7]\nkind = "{kind}"\n{option}')
+
+
+def test_a_recording_that_holds_such_an_option_is_read_as_ever() -> None:
+    channels = {"7": {"kind": "arinc708", "sdi": 1}}
+    config = check_config({"adapters": [{"name": "a", "source": "serial:x", "channels": channels}]}, "test")
+    assert recorded_config(describe(config, None)) == config
 
 
 def test_one_mistake_in_an_adapter_is_one_complaint(tmp_path: Path) -> None:
