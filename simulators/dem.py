@@ -49,7 +49,9 @@ def _posts(file: rasterio.DatasetReader, latitudes: Floats, longitudes: Floats) 
     if file.crs is None:
         raise ValueError(f"{file.name} names no coordinate system: convert it to a GeoTIFF that does")
     x, y = longitudes, latitudes
-    if not file.crs.is_geographic:
+    if file.crs.is_geographic:  # brought beside the file, which may count from -180 or from 0
+        x = x - 360 * np.round((np.mean(x) - (file.bounds.left + file.bounds.right) / 2) / 360)
+    else:
         x, y = pyproj.Transformer.from_crs("EPSG:4326", file.crs, always_xy=True).transform(x, y)
     to_pixels = ~file.transform
     rows = to_pixels.d * x + to_pixels.e * y + (to_pixels.f - 0.5)

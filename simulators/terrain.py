@@ -56,12 +56,11 @@ def build(settings: scenario.World, latitude_deg: Floats, longitude_deg: Floats,
     Raises FileNotFoundError for a missing terrain file, and ValueError where the flight's radar would look at ground
     that the file does not hold, unless the settings say `incomplete`.
     """
-    middle = pyproj.Proj(
-        proj="aeqd", lat_0=float(np.mean(latitude_deg)), lon_0=float(np.mean(longitude_deg)), ellps="WGS84"
-    )
+    middle_deg = float(np.mean(longitude_deg))
+    middle = pyproj.Proj(proj="aeqd", lat_0=float(np.mean(latitude_deg)), lon_0=middle_deg, ellps="WGS84")
     east, north = (np.asarray(axis) for axis in middle(longitude_deg, latitude_deg))
     eastings, northings = _axis(east, reach_m, settings.spacing_m), _axis(north, reach_m, settings.spacing_m)
-    latitudes, longitudes = _geodetic(middle, eastings, northings)
+    latitudes, longitudes = _geodetic(middle, middle_deg, eastings, northings)
     heights = dem.sample(settings, latitudes, longitudes, seed)
     ground = Ground(heights, float(eastings[0]), float(northings[0]), settings.spacing_m, middle)
     if not settings.incomplete:
@@ -74,10 +73,11 @@ def _axis(track: Floats, reach_m: float, spacing: float) -> Floats:
     return np.arange(first, last + 1) * spacing
 
 
-def _geodetic(projection: pyproj.Proj, eastings: Floats, northings: Floats) -> tuple[Floats, Floats]:
+def _geodetic(projection: pyproj.Proj, middle_deg: float, eastings: Floats, northings: Floats) -> tuple[Floats, Floats]:
     """Latitude and longitude of every raster point: projected on a wide lattice, linear in between."""
     (coarse_east, to_east), (coarse_north, to_north) = _hats(eastings), _hats(northings)
     longitude, latitude = projection(*np.meshgrid(coarse_east, coarse_north), inverse=True)
+    longitude -= 360 * np.round((longitude - middle_deg) / 360)  # without a break at the date line
     return to_north @ latitude @ to_east.T, to_north @ longitude @ to_east.T
 
 

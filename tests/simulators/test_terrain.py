@@ -61,6 +61,24 @@ def test_a_plane_in_latitude_and_longitude_is_read_to_a_decimetre(plane: Path) -
     assert ground.elevation(*ground.locate(latitude, longitude)) == pytest.approx(expected, abs=0.1)
 
 
+@pytest.mark.parametrize("file_turns", [0, -1])
+@pytest.mark.parametrize("flight_turns", [0, -1])
+def test_the_date_line_is_a_meridian_like_any_other(
+    plane: Path, tmp_path: Path, file_turns: int, flight_turns: int
+) -> None:
+    """The plane moved from 7 to 180 degrees east, where files and flights count on or begin at -180."""
+    with rasterio.open(plane) as file:
+        profile, posts = file.profile, file.read()
+    profile["transform"] = Affine.translation(173 + 360 * file_turns, 0) @ profile["transform"]
+    path = tmp_path / "line.tif"
+    with rasterio.open(path, "w", **profile) as file:
+        file.write(posts)
+    track = np.array([45.0, 45.0]), np.array([6.99, 7.02])
+    inland = build(World(terrain=str(plane)), *track, 5000.0, seed=0)
+    ground = build(World(terrain=str(path)), track[0], track[1] + 173 + 360 * flight_turns, 5000.0, seed=0)
+    np.testing.assert_allclose(ground.heights, inland.heights, atol=1e-3)
+
+
 def test_ground_that_the_file_lacks_is_refused_with_its_place_unless_allowed(plane: Path) -> None:
     track = (np.array([45.0]), np.array([7.0]))
     with pytest.raises(ValueError, match=r"plane.tif holds no ground at .* world.incomplete"):
