@@ -31,7 +31,7 @@ def sample(settings: scenario.World, latitudes: Floats, longitudes: Floats, seed
         places = _posts(file, latitudes, longitudes)
         rows, columns = (_needed(axis, posts) for axis, posts in zip(places, file.shape, strict=True))
         window = Window.from_slices(rows, columns)
-        band = file.read(1, window=window, masked=True)
+        band = file.read(1, window=window, masked=True) * file.scales[0] + file.offsets[0]
     places[0] -= rows.start
     places[1] -= columns.start
     known = ~np.ma.getmaskarray(band)

@@ -61,6 +61,15 @@ def test_a_plane_in_latitude_and_longitude_is_read_to_a_decimetre(plane: Path) -
     assert ground.elevation(*ground.locate(latitude, longitude)) == pytest.approx(expected, abs=0.1)
 
 
+def test_heights_are_what_scale_and_offset_of_the_file_make_of_its_numbers(plane: Path) -> None:
+    track = (np.array([45.0]), np.array([7.0]))
+    plain = build(World(terrain=str(plane), post_noise_m=0.0), *track, 5000.0, seed=0)
+    with rasterio.open(plane, "r+") as file:
+        file.scales, file.offsets = (0.5,), (50.0,)
+    scaled = build(World(terrain=str(plane), post_noise_m=0.0), *track, 5000.0, seed=0)
+    np.testing.assert_allclose(scaled.heights, plain.heights / 2 + 50, atol=1e-3)
+
+
 @pytest.mark.parametrize("file_turns", [0, -1])
 @pytest.mark.parametrize("flight_turns", [0, -1])
 def test_the_date_line_is_a_meridian_like_any_other(
