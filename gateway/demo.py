@@ -41,7 +41,7 @@ from gateway.report import Flown, Picture, write_report
 from gateway.stopping import Stop
 from gateway.tables import plain_console
 from gateway.threads import GuardedThread
-from gateway.warmup import warm_up_gateway
+from gateway.warmup import COMPILING, compiled, warm_up_gateway
 from monitor.comparison import Comparison
 from monitor.integrity import Monitor
 from monitor.scans import Scan
@@ -121,6 +121,8 @@ def fly(out: Path, seed: int, speed: float, stop: Stop) -> None:
     console.print(
         f"Three legs of {LEG_S:.0f} s over the White Mountains at {speed:g} times real bus rates, P_FA {P_FA:g}"
     )
+    if not compiled():
+        console.print(COMPILING)
     warm_up_gateway(Monitor(open_terrain(true_terrain)))  # or the first gateway compiles before it hears anything
     flown = []
     for leg in legs:

@@ -19,6 +19,7 @@ from monitor.warmup import warm_up
 
 COARSE, FINE = 0o110, 0o120  # halves of a latitude, which are joined
 NORMAL = 3  # SSM
+COMPILING = "first start on this machine: compiling for half a minute"
 LATER_NS = 2_000_000_000  # so that the bus has a second that is over
 
 

@@ -28,7 +28,7 @@ def run(
     from gateway.errors import GatewayError
     from gateway.metadata import build_monitor
     from gateway.service import Service
-    from gateway.warmup import compiled
+    from gateway.warmup import COMPILING, compiled
 
     if bool(config) == bool(source):
         raise GatewayError("name either a rack file with -c or at least one --source, such as serial:/dev/ttyUSB0")
@@ -57,7 +57,7 @@ def run(
     if service.recording_path:
         print(f"recording to {service.recording_path}", file=sys.stderr)
     if not compiled():
-        print("first start: compiling for half a minute; what comes is recorded, and judged then", file=sys.stderr)
+        print(f"{COMPILING}; what comes is recorded, and judged then", file=sys.stderr)
     service.run_until(stop, seconds)
     if service.stuck:  # it holds stdout, so an orderly exit would wait for it too
         print(f"shadebus: {'; '.join(service.failures)}", file=sys.stderr, flush=True)
