@@ -41,7 +41,6 @@ class Service:
         self._to_core = CoreQueue(lambda reason: self._journal.report("core", "BEHIND", reason))
         self._journal = Journal(self._keeper, self._to_core.deliver, limit_bytes)
         self._core = core = Core(lambda before: Pipeline(config, monitor, watcher, before), emit, self._core_failed)
-
         self._warm = threading.Event()  # set when the core has its kernels, for which a first start compiles
 
         def core_work() -> None:

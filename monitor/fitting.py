@@ -22,7 +22,7 @@ from monitor.shift import clipped_centres, score, with_common_errors
 
 QUARTILE = float(ndtri(0.75))  # of a normal distribution: half of it lies nearer to its median
 # Of unmatched shadows. Even terrain has less, but a calibration over it must hold over its rougher parts too, and a few
-# hundred scans measure it badly: simulated flights at all heights over mountains have 0.037.
+# hundred scans measure it badly.
 LEAST_OVERDISPERSION = 0.03
 LEFT_OUT = 0.5  # percent of the scans at either end of the limits
 

@@ -154,8 +154,8 @@ def flown(monitor: Monitor, meridian: int, scans: list[Scan]) -> list[Verdict]:
     said = []
     for k, (scan, east_deg) in enumerate(zip(scans, FLOWN, strict=True)):
         begin_ns = 4000 * MS * k
-        scan = replace(scan, time_ns=scan.time_ns + begin_ns)  # noqa: PLW2901
-        said.append(monitor.judge(scan, crossing(meridian, east_deg, begin_ns))[0])
+        later = replace(scan, time_ns=scan.time_ns + begin_ns)
+        said.append(monitor.judge(later, crossing(meridian, east_deg, begin_ns))[0])
     return said
 
 

@@ -119,6 +119,19 @@ def test_disparities_without_a_spread_are_refused() -> None:
         fitted([np.r_[np.zeros(30), np.arange(10.0)]] * 3)
 
 
+def test_edges_of_which_most_are_exact_are_still_not_known_to_less_than_a_bin() -> None:
+    """Front edges that never differ, as of coarse bins; all that there is of a disparity is of the back edge."""
+    scans = [
+        ScanSample(np.zeros(len(d)), d, np.zeros(len(d)), np.ones(len(d)), NONE, NONE, np.nan) for d in normal_scans(20)
+    ]
+    found = fit(scans, [], (), SETTINGS, name="made", provenance="drawn", **RADAR).shift
+    assert found is not None
+    back = np.concatenate([scan.back for scan in scans])
+    spread = np.median(np.abs(back - np.median(back))) / norm.ppf(0.75)
+    assert (found.front.median_bins, found.front.clip_bins) == (0.0, 1.0)
+    assert (found.back.median_bins, found.back.clip_bins) == pytest.approx((np.median(back), 2 * spread), rel=1e-12)
+
+
 def fitted_to_shares(counts: Any, eligible: int, levels: NDArray[np.float64]) -> Calibration:
     scans = [
         ScanSample(d, d, np.zeros(len(d)), np.ones(len(d)), Unmatched(int(count), eligible), NONE, level)
